@@ -1,4 +1,4 @@
-"""What runs without the compiler (``NUMBA_DISABLE_JIT=1``, for a debugger and coverage), and what does not."""
+"""The marks of tests that run without the compiler (``NUMBA_DISABLE_JIT=1``, for debuggers and coverage)."""
 
 import numba
 import pytest

@@ -1,4 +1,4 @@
-"""What all tests share: no screen, no Qt where its libraries are missing, and no warning that no test expects."""
+"""Settings of all tests: no screen, no Qt if its libraries are missing, and no unexpected warnings."""
 
 import functools
 import gc
@@ -52,7 +52,7 @@ QT_IS_HERE = not QT_MISSING
 
 @contextmanager
 def skipping_without_qt() -> Iterator[None]:
-    """Skip what fails within because Qt's system libraries are missing; nothing where Qt can be loaded."""
+    """Skip a test that fails because Qt's system libraries are missing."""
     try:
         yield
     except Exception as error:
@@ -80,7 +80,7 @@ class ModuleWithoutQt(pytest.Module):
 
 
 def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Do not look into the folders of windows where no window can be loaded."""
+    """Do not collect the folders of window tests if Qt is missing."""
     if QT_MISSING and path.parent == Path(__file__).parent and path.name in NEED_QT:
         return FolderWithoutQt.from_parent(parent, path=path)
     return None
@@ -93,7 +93,10 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> 
 
 @functools.cache
 def listed_circles(config: pytest.Config) -> dict[str, str]:
-    """Return circles of tests that run later than their marks say, written by `tests/benchmarks/project/circles.py`."""
+    """Return the circle of each test that runs in a later circle than its markers indicate.
+
+    `tests/benchmarks/project/circles.py` writes this list.
+    """
     if config.getoption("by_marks"):
         return {}
     lines = Path(__file__).with_name("circles.txt").read_text(encoding="utf-8").splitlines()
@@ -101,19 +104,19 @@ def listed_circles(config: pytest.Config) -> dict[str, str]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options that write golden files anew and that record tests for a new list of circles."""
-    parser.addoption("--regenerate", action="store_true", help="write the golden files anew; review the difference")
+    """Add the options that rewrite golden files and that ignore the list of circles."""
+    parser.addoption("--regenerate", action="store_true", help="rewrite golden files; review the difference")
     parser.addoption("--by-marks", action="store_true", help="choose circles by the marks alone, not by circles.txt")
 
 
 def pytest_plugin_registered(plugin: object, manager: pytest.PytestPluginManager) -> None:
-    """Without Qt the plugin that tests it cannot start, and must not keep the other tests from running."""
+    """Unregister pytest-qt without Qt, since it cannot start then and would prevent all tests."""
     if not QT_IS_HERE and manager.get_name(plugin) == "pytest-qt":
         manager.unregister(plugin)
 
 
 def pytest_sessionstart() -> None:
-    """Collect garbage between tests alone: a thread that collected would destroy widgets whose timers then crash Qt."""
+    """Collect garbage only between tests: a collecting thread would destroy widgets whose timers then crash Qt."""
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in a job that a script starts in the background
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if QT_IS_HERE:
@@ -152,16 +155,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.get_closest_marker("variants"):
             collected.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    for found in collected.values():
-        (count,) = found[0].get_closest_marker("variants").args
-        kept = {len(found) * place // count for place in range(count)}
-        for place, item in enumerate(found):
+    for variants in collected.values():
+        (count,) = variants[0].get_closest_marker("variants").args
+        kept = {len(variants) * place // count for place in range(count)}
+        for place, item in enumerate(variants):
             if place not in kept:
                 item.add_marker("nightly")
 
 
 def pytest_collection_finish() -> None:
-    """Do not look at the modules again that collecting the tests imported."""
+    """Freeze the modules that were imported while tests were collected."""
     if QT_IS_HERE:
         gc.freeze()
 
@@ -175,19 +178,19 @@ def pytest_runtest_setup() -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call() -> Iterator[None]:
-    """Fail where a window or dialog that is there after a test prints program text, in its tips and names too."""
+    """Fail if a window or dialog contains program text after a test, also in tips and names."""
     with skipping_without_qt():
         yield
     widgets = sys.modules.get("PySide6.QtWidgets")
     if widgets is not None and isinstance(widgets.QApplication.instance(), widgets.QApplication):
         from tests.program_text import printed_in_windows
 
-        assert not (found := printed_in_windows()), found
+        assert not (texts := printed_in_windows()), texts
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_runtest_teardown() -> None:
-    """Collect what is due; what a full collection leaves, mostly modules, is not looked at again."""
+    """Collect garbage if due; freeze the objects that survive a full collection, mostly modules."""
     if QT_IS_HERE:
         from study_app.app.timing import collect_if_due
 
@@ -196,7 +199,7 @@ def pytest_runtest_teardown() -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Wait for what windows left in threads: Python aborts if it ends while one of them loads a module."""
+    """Wait for threads of windows: Python aborts if it ends while one of them loads a module."""
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["changed_texts"] = dict(golden.CHANGED)
     if (background := sys.modules.get("study_app.gui.widgets.background")) is not None:
@@ -205,7 +208,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:
-    """Take the changed texts of a worker process."""
+    """Add the changed texts of a worker process."""
     golden.CHANGED.update(getattr(node, "workeroutput", {}).get("changed_texts", {}))
 
 
@@ -227,7 +230,7 @@ _settings = itertools.count()
 
 @pytest.fixture(autouse=True)
 def settings_of_nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let no test meet, or change, the settings of this machine's user; the folder is not there until one is kept."""
+    """Keep tests away from the settings of this machine's user; the folder is created with the first setting."""
     settings = tmp_path_factory.getbasetemp() / f"settings-{next(_settings)}"
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(settings))
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(settings.with_name(f"{settings.name}-data")))
@@ -272,7 +275,7 @@ def dask_cluster() -> Iterator[str]:
 
 @pytest.fixture
 def worker_options(request: pytest.FixtureRequest) -> tuple[tuple[str, str], ...]:
-    """Return options that must not change a result: one worker, two, and a cluster where there can be one."""
+    """Return worker options that must not change a result: one worker, two, and a cluster if possible."""
     from tests.workers.local_cluster import INSTALLED
 
     here = (("--workers", "1"), ("--workers", "2"))
@@ -300,7 +303,7 @@ def no_unexpected_log(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def no_window_left() -> Iterator[None]:
-    """Fail where a test leaves a window on the screen, and take it away: the next test has its own."""
+    """Fail if a test leaves a window on the screen, and close it before the next test."""
     yield
     widgets = sys.modules.get("PySide6.QtWidgets")
     if widgets is None or not isinstance(widgets.QApplication.instance(), widgets.QApplication):
@@ -315,11 +318,11 @@ def no_window_left() -> Iterator[None]:
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Return a folder that packages with plug-ins can be installed into."""
-    from tests.plug_in_packages import forget  # loads the model of studies, which most tests need not
+    from tests.plug_in_packages import forget_plug_ins  # loads the model of studies, which most tests need not
 
     folder = tmp_path / "packages"
     folder.mkdir()
     monkeypatch.syspath_prepend(folder)
-    forget()
+    forget_plug_ins()
     yield folder
-    forget("toy_")
+    forget_plug_ins("toy_")

@@ -38,7 +38,7 @@ def with_an_odd_value(content: bytes, chance: random.Random) -> bytes:
 
 
 def with_deep_nesting(content: bytes, chance: random.Random) -> bytes:
-    """Put a list into a file that is nested as deep as no reader can follow, or a number of as many digits."""
+    """Put a list that is nested too deeply for any reader, or a number with as many digits, into a file."""
     depth = chance.choice((100, 900, 3000, 100_000))
     deep = b"[" * depth + b"]" * depth if chance.random() < 0.7 else b"9" * (depth * 2)
     lines = content.splitlines(keepends=True)

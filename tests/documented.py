@@ -38,8 +38,8 @@ def name(page: Path) -> str:
 
 def blocks(page: Path) -> list[Block]:
     """Return the blocks of a page."""
-    found = _FENCE.finditer(page.read_text(encoding="utf-8"))
-    return [Block(one["run"] is not None, one["language"], one["text"]) for one in found]
+    fences = _FENCE.finditer(page.read_text(encoding="utf-8"))
+    return [Block(fence["run"] is not None, fence["language"], fence["text"]) for fence in fences]
 
 
 def lines_to_type(block: Block) -> Iterator[str]:
@@ -61,8 +61,8 @@ def typed_commands(page: Path) -> Iterator[list[str]]:
 def mentioned_commands(page: Path) -> Iterator[list[str]]:
     """Yield the words of every command of the program within a page's sentences."""
     prose = _FENCE.sub("", page.read_text(encoding="utf-8"))
-    for found in _INLINE.finditer(prose):
-        yield shlex.split(found[1].replace("\n", " ").replace("\\|", "or"))
+    for command in _INLINE.finditer(prose):
+        yield shlex.split(command[1].replace("\n", " ").replace("\\|", "or"))
 
 
 def commands_of(line: str) -> Iterator[list[str]]:

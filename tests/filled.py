@@ -1,4 +1,4 @@
-"""Results made up from their types alone: every field of a dataclass gets a seeded value, None where that may be."""
+"""Results made up from their types: every field gets a seeded value, or None if it is optional."""
 
 import dataclasses
 import typing
@@ -13,38 +13,40 @@ from numpy.typing import NDArray
 WORDS = ("kalman", "water", "honey", "prompt", "late", "drag", "wake", "P001")
 
 
-def filled(kind: Any, rng: np.random.Generator, **given: Any) -> Any:
-    """Return a value of a type; ``given`` are fields by name, at any depth: a value, or what makes it of ``rng``."""
+def filled(kind: Any, rng: np.random.Generator, **overrides: Any) -> Any:
+    """Return a value of a type; ``overrides`` are fields by name, at any depth: a value, or a function of ``rng``."""
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if origin in (UnionType, typing.Union):
-        some = [one for one in inner if one is not NoneType]
-        return None if len(some) < len(inner) and rng.random() < 0.25 else filled(some[0], rng, **given)
+        some = [option for option in inner if option is not NoneType]
+        return None if len(some) < len(inner) and rng.random() < 0.25 else filled(some[0], rng, **overrides)
     if origin is typing.Literal:
         return inner[int(rng.integers(len(inner)))]
     if origin is typing.Annotated:
-        return filled(inner[0], rng, **given)
+        return filled(inner[0], rng, **overrides)
     if kind is np.ndarray or origin in (np.ndarray, NDArray):  # from numpy 2.5 on an alias of its own
         return np.sort(rng.lognormal(0, 1, 12))
     if origin is tuple and not (len(inner) == 2 and inner[1] is ...):
-        return tuple(filled(one, rng, **given) for one in inner)
+        return tuple(filled(part, rng, **overrides) for part in inner)
     if origin in (tuple, list, Sequence, Iterable):
-        made = [filled(inner[0], rng, **given) for _ in range(int(rng.integers(1, 4)))]
-        return made if origin is list else tuple(made)
+        items = [filled(inner[0], rng, **overrides) for _ in range(int(rng.integers(1, 4)))]
+        return items if origin is list else tuple(items)
     if origin in (dict, Mapping):
-        return {filled(inner[0], rng, **given): filled(inner[1], rng, **given) for _ in range(2)}
+        return {filled(inner[0], rng, **overrides): filled(inner[1], rng, **overrides) for _ in range(2)}
     if kind in PLAIN:
         return PLAIN[kind](rng)
     if isinstance(kind, type) and issubclass(kind, Enum):
         return list(kind)[int(rng.integers(len(kind)))]
     hints = typing.get_type_hints(kind)
     names = (
-        [one.name for one in dataclasses.fields(kind) if one.init] if dataclasses.is_dataclass(kind) else kind._fields
+        [field.name for field in dataclasses.fields(kind) if field.init]
+        if dataclasses.is_dataclass(kind)
+        else kind._fields
     )
-    found = {}
+    values = {}
     for name in names:
-        own = given.get(name, filled)
-        found[name] = filled(hints[name], rng, **given) if own is filled else own(rng) if callable(own) else own
-    return kind(**found)
+        own = overrides.get(name, filled)
+        values[name] = filled(hints[name], rng, **overrides) if own is filled else own(rng) if callable(own) else own
+    return kind(**values)
 
 
 PLAIN: dict[Any, Callable[[np.random.Generator], Any]] = {

@@ -50,20 +50,20 @@ def masked(line: str) -> str:
 
 def each_once(lines: Iterable[str], known: Iterable[str] = ()) -> Iterator[str]:
     """Yield each line that is neither known nor repeated, with # for numbers; a heading only if such a line follows."""
-    seen, headings = {masked(line) for line in known}, list[str]()
+    masked_lines, headings = {masked(line) for line in known}, list[str]()
     for line in lines:
         if line.startswith(HEADINGS):
-            headings = [kept for kept in headings if kept.startswith("==") and line.startswith("--")]
+            headings = [heading for heading in headings if heading.startswith("==") and line.startswith("--")]
             headings.append(line)
-        elif (text := masked(line)) not in seen:
-            seen.add(text)
+        elif (text := masked(line)) not in masked_lines:
+            masked_lines.add(text)
             yield from headings
             headings = []
             yield text
 
 
 def compare(
-    kept: Path,
+    golden_file: Path,
     lines: Iterable[str],
     config: pytest.Config,
     *,
@@ -73,49 +73,51 @@ def compare(
     exact: bool = False,
     fixed: bool = False,
 ) -> None:
-    """Compare lines with a golden file, or write it; a ``fixed`` file is written once, and then never anew.
+    """Compare lines with a golden file, or write it; a ``fixed`` file is written only once.
 
     What ``mask`` matches is left out; numbers may differ a little, or as they are written, unless ``exact``.
     """
-    found = "\n".join(lines).split("\n")
-    assert any(found), f"{kept} is compared with nothing"
+    actual = "\n".join(lines).split("\n")
+    assert any(actual), f"{golden_file} is compared with nothing"
     if mask is not None:
-        found = [mask.sub("*", line) for line in found]
-    if config.getoption("regenerate") and not (fixed and kept.exists()):
-        note_changed_texts(kept.read_text(encoding="utf-8").splitlines() if kept.exists() else [], found)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_text("\n".join(found) + "\n", encoding="utf-8", newline="\n")
-    expected = kept.read_text(encoding="utf-8").removesuffix("\n").split("\n")
+        actual = [mask.sub("*", line) for line in actual]
+    if config.getoption("regenerate") and not (fixed and golden_file.exists()):
+        note_changed_texts(golden_file.read_text(encoding="utf-8").splitlines() if golden_file.exists() else [], actual)
+        golden_file.parent.mkdir(parents=True, exist_ok=True)
+        golden_file.write_text("\n".join(actual) + "\n", encoding="utf-8", newline="\n")
+    expected = golden_file.read_text(encoding="utf-8").removesuffix("\n").split("\n")
     if os.sep == "\\":  # paths of Windows
-        found, expected = [*map(as_on_linux, found)], [*map(as_on_linux, expected)]
-    pairs = zip_longest(expected, found)
-    alike = found == expected if exact else all(None not in pair and _alike(*pair, rel, abs_) for pair in pairs)
+        actual, expected = [*map(as_on_linux, actual)], [*map(as_on_linux, expected)]
+    pairs = zip_longest(expected, actual)
+    alike = actual == expected if exact else all(None not in pair and _alike(*pair, rel, abs_) for pair in pairs)
     if not alike:
-        different = list(unified_diff(expected, found, n=0, lineterm=""))[2:]
+        different = list(unified_diff(expected, actual, n=0, lineterm=""))[2:]
         more = [f"... {len(different) - SHOWN} lines more"] if len(different) > SHOWN else []
-        pytest.fail("\n".join([f"{kept}: review, then --regenerate", *different[:SHOWN], *more]), pytrace=False)
+        pytest.fail("\n".join([f"{golden_file}: review, then --regenerate", *different[:SHOWN], *more]), pytrace=False)
 
 
-def check_kept(kept: Path, lines: Iterable[str]) -> None:
-    """Compare lines, with their numbers, with a file that people change: no option writes it."""
-    found, expected = list(lines), kept.read_text(encoding="utf-8").splitlines()
+def check_kept(golden_file: Path, lines: Iterable[str]) -> None:
+    """Compare lines and their numbers with a file that is only edited by hand."""
+    actual, expected = list(lines), golden_file.read_text(encoding="utf-8").splitlines()
     if sys.platform == "win32":  # both, since the backslashes of other texts become slashes, too
-        found, expected = [[as_on_linux(line) for line in side] for side in (found, expected)]
-    assert found == expected
+        actual, expected = [[as_on_linux(line) for line in side] for side in (actual, expected)]
+    if actual != expected:
+        different = "\n".join(unified_diff(expected, actual, n=0, lineterm=""))
+        pytest.fail(f"{golden_file}: review, then edit it\n{different}", pytrace=False)
 
 
-def _alike(expected: str, found: str, rel: float, abs_: float) -> bool:
-    """Return whether lines are equal but for the last digits of numbers, which depend on libraries and processors."""
-    if expected == found:
+def _alike(expected: str, actual: str, rel: float, abs_: float) -> bool:
+    """Return whether lines are equal except for the last digits of numbers, which vary between machines."""
+    if expected == actual:
         return True
-    if NUMBER.sub("", expected) != NUMBER.sub("", found):
+    if NUMBER.sub("", expected) != NUMBER.sub("", actual):
         return False
-    numbers = [[float(number) for number in NUMBER.findall(line)] for line in (expected, found)]
+    numbers = [[float(number) for number in NUMBER.findall(line)] for line in (expected, actual)]
     return numbers[0] == pytest.approx(numbers[1], rel=rel, abs=abs_)
 
 
 def runs(lines: Iterable[str]) -> Iterator[str]:
-    """Yield each line that repeats once, with the number of its times."""
+    """Yield each run of equal lines once, with its length."""
     for line, same in groupby(lines):
         count = sum(1 for _ in same)
         yield line if count == 1 else f"{line} ({count} times)"

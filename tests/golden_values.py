@@ -29,35 +29,35 @@ NOTHING = {"n/a", "", "None"}
 
 
 def number(value: float, digits: int = 7, decimals: int = 14) -> str:
-    """Return a number; 1e-15 is 0, and so is -0."""
+    """Return a number as text; 1e-15 and -0 become 0."""
     return f"{round(float(value), decimals) + 0.0:.{digits}g}"
 
 
 def numbers(values: Any, digits: int = 5, decimals: int = 7) -> str:
-    """Return numbers; of more than ``MOST``: count, ends, sum, and sum by place."""
+    """Return numbers as text; of more than ``MOST``: count, range, sum and sum weighted by index."""
     flat = np.ma.filled(np.ma.asarray(values, float), np.nan).ravel()
     if len(flat) > MOST:
         known = np.nan_to_num(flat)
         flat = [len(flat), known.min(), known.max(), known.sum(), known @ np.arange(len(known)) / len(known)]
-    return " ".join(number(one, digits, decimals) for one in flat)
+    return " ".join(number(value, digits, decimals) for value in flat)
 
 
 def parts_of(value: Any) -> dict[str, Any] | None:
-    """Return the parts of a mapping or record, or of a dataclass, named tuple or model those that are no defaults."""
+    """Return the parts of a mapping or record; of a dataclass, named tuple or model, those that are not defaults."""
     if isinstance(value, Mapping):
-        return {str(name): one for name, one in value.items()}
+        return {str(name): part for name, part in value.items()}
     if isinstance(value, np.ndarray | np.void) and value.dtype.names and value.shape in ((), (1,)):
         return {name: value.reshape(())[name][()] for name in value.dtype.names}
     if is_dataclass(value) and not isinstance(value, type):
-        defaults: dict[str, Any] = {one.name: one.default for one in fields(value)}
+        defaults: dict[str, Any] = {field.name: field.default for field in fields(value)}
     elif hasattr(value, "_asdict"):
         defaults = dict.fromkeys(value._fields, MISSING) | value._field_defaults
     elif hasattr(type(value), "model_fields"):
-        defaults = {name: one.default for name, one in type(value).model_fields.items()}
+        defaults = {name: field.default for name, field in type(value).model_fields.items()}
     else:
         return None
     parts = {name: getattr(value, name) for name in defaults}
-    return {name: one for name, one in parts.items() if not _equal(one, defaults[name])}
+    return {name: part for name, part in parts.items() if not _equal(part, defaults[name])}
 
 
 def _equal(value: Any, default: Any) -> bool:
@@ -68,7 +68,7 @@ def one_line(value: Any) -> str:
     """Return a value in one line: numbers with 7 digits, paths joined with dots, neither defaults nor addresses."""
     parts = parts_of(value)
     if parts is not None:
-        inner = ", ".join(f"{name}: {one_line(one)}" for name, one in parts.items())
+        inner = ", ".join(f"{name}: {one_line(part)}" for name, part in parts.items())
         return f"{type(value).__name__}({inner})" if _is_typed(value) else f"{{{inner}}}"
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
@@ -78,7 +78,7 @@ def one_line(value: Any) -> str:
         case tuple() if value and isinstance(value[0], str) and all(map(_is_step, value)):
             return ".".join(map(str, value))
         case tuple() | list():
-            if len(value) > MOST and all(isinstance(one, int | float) for one in value):
+            if len(value) > MOST and all(isinstance(item, int | float) for item in value):
                 return f"[{numbers(value, 7, 14)}]"
             return f"[{', '.join(map(one_line, value))}]"
         case Set():
@@ -103,13 +103,13 @@ def value_lines(value: Any, name: str = "", depth: int = 0) -> Iterator[str]:
     is_table = False
     if len(line) > WIDTH and _is_nested(value):
         if parts is None:
-            line, below = "", [("", one) for one in value]
-            is_table = len(value) >= RECORDS and all(isinstance(one, Mapping) for one in value)
+            line, below = "", [("", item) for item in value]
+            is_table = len(value) >= RECORDS and all(isinstance(item, Mapping) for item in value)
         elif _is_typed(value):
             line, below = type(value).__name__, list(parts.items())
         else:
-            below = [(key, one) for key, one in parts.items() if _is_nested(one)]
-            plain = {key: one for key, one in parts.items() if not _is_nested(one)}
+            below = [(key, part) for key, part in parts.items() if _is_nested(part)]
+            plain = {key: part for key, part in parts.items() if not _is_nested(part)}
             line = one_line(plain) if plain else ""
     if head := ": ".join(filter(None, (name, line))):
         yield "  " * depth + head
@@ -117,22 +117,22 @@ def value_lines(value: Any, name: str = "", depth: int = 0) -> Iterator[str]:
     if is_table:
         yield from (f"{'  ' * depth}{head}: {column}" for head, column in _columns(value))
     else:
-        for key, one in below:
-            yield from value_lines(one, key, depth)
+        for key, part in below:
+            yield from value_lines(part, key, depth)
 
 
 def _columns(records: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
-    rows = [_flat(one) for one in records]
+    rows = [_flat(record) for record in records]
     for key in dict.fromkeys(key for row in rows for key in row):
         yield key, _column([CHANGING.sub("*", row.get(key, "")) for row in rows])
 
 
 def _flat(value: Mapping[str, Any], place: str = "") -> dict[str, str]:
     """Return the plain parts of a mapping by their place in it."""
-    found: dict[str, str] = {}
-    for key, one in value.items():
-        found |= _flat(one, f"{place}{key}.") if isinstance(one, Mapping) else {f"{place}{key}": one_line(one)}
-    return found
+    parts: dict[str, str] = {}
+    for key, part in value.items():
+        parts |= _flat(part, f"{place}{key}.") if isinstance(part, Mapping) else {f"{place}{key}": one_line(part)}
+    return parts
 
 
 def _is_nested(value: Any) -> bool:
@@ -140,7 +140,7 @@ def _is_nested(value: Any) -> bool:
 
 
 def changed(before: Sequence[str], after: Sequence[str], *, numbered: bool = False) -> Iterator[str]:
-    """Yield the lines that come, and of lines that go together the first 60 characters and how many others.
+    """Yield new lines, and of each block of removed lines the first 60 characters and the number of others.
 
     Where it matters at which place a line comes, ``numbered`` adds its number.
     """
@@ -170,7 +170,7 @@ def table_lines(text: str) -> Iterator[str]:
 
 
 def _column(cells: Sequence[str]) -> str:
-    """Return a cell that all are, or few cells, or some and what tells whether any other one changes.
+    """Return a column in one line: a constant cell, few cells, or some with numbers that reveal other changes.
 
     Of numbers that are the count, ends, sum, sum by place, and sum of logarithms, which a small one changes as well.
     """
@@ -180,11 +180,11 @@ def _column(cells: Sequence[str]) -> str:
     if len(cells) <= CELLS:
         return " | ".join(cells)
     if len(kinds) <= CELLS // 2:
-        found = sorted(kinds)
-        order = _digest(" ".join(str(found.index(cell)) for cell in cells))
-        rest = f"{', '.join(f'{kinds[cell]} times {cell}' for cell in found)}, in order {order}"
+        distinct_cells = sorted(kinds)
+        order = _digest(" ".join(str(distinct_cells.index(cell)) for cell in cells))
+        rest = f"{', '.join(f'{kinds[cell]} times {cell}' for cell in distinct_cells)}, in order {order}"
     else:
-        values = np.array([one for cell in cells for one in NUMBER.findall(cell)], float)
+        values = np.array([text for cell in cells for text in NUMBER.findall(cell)], float)
         rest = f"{numbers(values, 7)} {number(np.log(np.abs(values[values != 0])).sum())}"
         if any(NUMBER.sub("", cell) for cell in cells if cell not in NOTHING):
             rest += f" and {_digest(NUMBER.sub('', ' '.join(cells)))}"
@@ -192,7 +192,7 @@ def _column(cells: Sequence[str]) -> str:
 
 
 def _digest(text: str) -> str:
-    """Return letters that differ if a text does."""
+    """Return a short digest of a text."""
     return f"{zlib.crc32(text.encode()):08x}".translate(str.maketrans("0123456789", "ghijklmnop"))
 
 

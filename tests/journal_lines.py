@@ -1,4 +1,4 @@
-"""Events of a journal for tests: with nothing where a test says nothing."""
+"""Events of a journal for tests, with empty fields by default."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -24,5 +24,5 @@ def event_from(line: Mapping[str, Any]) -> Event:
 
 
 def raw(lines: Iterable[Event]) -> list[dict[str, Any]]:
-    """Return lines as they are in the file, or would be."""
+    """Return journal lines as the file stores them."""
     return [line.line() for line in lines]

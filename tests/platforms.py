@@ -1,4 +1,4 @@
-"""What tests need of the operating system."""
+"""Conditions of the operating system that tests need."""
 
 import os
 import tempfile

@@ -1,4 +1,4 @@
-"""Packages with plug-ins, as an installer leaves them."""
+"""Installed packages with plug-ins."""
 
 import sys
 from pathlib import Path
@@ -25,11 +25,11 @@ def install(site: Path, package: str, kind: str, entry_points: dict[str, str], *
     (metadata / "entry_points.txt").write_text(f"[liquid_study.{kind}s]\n{points}", encoding="utf-8", newline="\n")
 
 
-def forget(*packages: str) -> None:
-    """Let plug-ins be looked for again, and the modules of these packages be imported again."""
-    for place in REGISTRIES.values():
-        if place.partition(":")[0] in sys.modules:
-            resolve_name(place).forget()
+def forget_plug_ins(*packages: str) -> None:
+    """Clear the plug-in registries, and remove these packages' modules from sys.modules."""
+    for registry_name in REGISTRIES.values():
+        if registry_name.partition(":")[0] in sys.modules:
+            resolve_name(registry_name).forget()
     schema.cache_clear()
     for name in [name for name in sys.modules if name.startswith(packages)]:
         del sys.modules[name]

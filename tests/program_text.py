@@ -1,4 +1,4 @@
-"""Program text that was printed instead of words: braces of a format, None, the representation of an object."""
+"""Program text in messages: format braces, None, and object representations."""
 
 import re
 from typing import Any
@@ -15,12 +15,18 @@ def printed(text: Any) -> bool:
 
 
 def printed_in_windows() -> list[str]:
-    """Return the program text in all windows there are, shown or not; what people type in a field is theirs."""
+    """Return the program text in all windows, shown or hidden, except in text that a user can type."""
     from PySide6.QtWidgets import QApplication, QLineEdit
 
-    return [
-        f"{type(widget).__name__}.{name}: {text}"
+    texts = [
+        (widget, name, text)
         for widget in QApplication.allWidgets()
         for name in PROPERTIES
-        if printed(text := widget.property(name)) and not (name == "text" and isinstance(widget, QLineEdit))
+        if (name != "windowTitle" or widget.isWindow())
+        and (text := widget.property(name))
+        and isinstance(text, str)
+        and not (name == "text" and isinstance(widget, QLineEdit))
     ]
+    if PRINTED.search("\n".join(text for _, _, text in texts)) is None:  # one search is quicker than thousands
+        return []
+    return [f"{type(widget).__name__}.{name}: {text}" for widget, name, text in texts if printed(text)]

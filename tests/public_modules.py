@@ -17,11 +17,11 @@ def package_of(module: str) -> str:
 
 def public_modules() -> set[str]:
     """Return the modules after "Public modules: " in the docstrings of the packages."""
-    found = set()
+    names = set()
     for path in Path("study_app").glob("*/__init__.py"):
         if public := _PUBLIC.search(ast.get_docstring(ast.parse(path.read_bytes())) or ""):
-            found |= {f"study_app.{path.parent.name}.{name}" for name in re.split(r",\s+", public[1])}
-    return found
+            names |= {f"study_app.{path.parent.name}.{name}" for name in re.split(r",\s+", public[1])}
+    return names
 
 
 def imported_by_packages(graph: ImportGraph) -> set[str]:
@@ -39,16 +39,16 @@ def imported_by_packages(graph: ImportGraph) -> set[str]:
 
 
 def imported_by_tests(modules: set[str]) -> set[str]:
-    """Return which of these modules the tests here import; another work tree with tests may be installed, too."""
-    found = set()
+    """Return which of these modules the tests of this work tree import."""
+    names_imported = set()
     for path in Path("tests").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_bytes())):
             if isinstance(node, ast.Import):
-                found |= {each.name for each in node.names}
+                names_imported |= {each.name for each in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module:
                 names = (f"{node.module}.{each.name}" for each in node.names)
-                found |= {name if name in modules else node.module for name in names}
-    return {name for name in found if name.startswith("study_app.") and name.count(".") > 1}
+                names_imported |= {name if name in modules else node.module for name in names}
+    return {name for name in names_imported if name.startswith("study_app.") and name.count(".") > 1}
 
 
 class PublicModules(Contract):

@@ -1,4 +1,4 @@
-"""Servers of this computer that hang, or send something else than what a client expects."""
+"""Servers on this computer that hang or send unexpected data."""
 
 import itertools
 import os
@@ -22,7 +22,7 @@ Answer: TypeAlias = Callable[[bytes, socket.socket], Parts]
 
 
 def dripped(data: bytes, pause_s: float = DRIP_S) -> Parts:
-    """Send bytes one by one, and go on with the last for ever."""
+    """Send bytes one by one, and repeat the last one forever."""
     for at in itertools.count():
         yield data[min(at, len(data) - 1) :][:1]
         time.sleep(pause_s)
@@ -100,7 +100,7 @@ STRANGERS: Final[Mapping[str, Answer]] = {
 
 
 def ends_with_each(client: Callable[[int], str], *, at_once: bool = False) -> dict[str, str]:
-    """Return what a client of a port says of each kind of stranger; one that takes longer than `PATIENCE_S` is late."""
+    """Return a client's message on each kind of wrong server; fail if it takes longer than `PATIENCE_S`."""
 
     def end(answer: Answer) -> str:
         with serving(answer, at_once=at_once) as port:
@@ -126,7 +126,7 @@ def _speak(connection: socket.socket, parts: Parts, ended: threading.Event) -> N
 
 @contextmanager
 def visited(port: int) -> Iterator[None]:
-    """Let each kind of stranger speak to a port of this computer."""
+    """Let each kind of wrong client connect to a port of this computer."""
     ended = threading.Event()
     with ThreadPoolExecutor(len(STRANGERS)) as pool:
         for answer in STRANGERS.values():

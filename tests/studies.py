@@ -20,7 +20,7 @@ from study_app.store.sessions.open_session import SessionStore
 
 
 def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
-    """Return the folder that ``make`` filled, once for all workers of a run: who changes it takes a copy."""
+    """Return the folder that ``make`` filled once for all workers of a run; copy it before changing it."""
     own = factory.getbasetemp()
     folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / f"once-{name}"
     if not folder.exists():
@@ -38,11 +38,11 @@ def begun(
     source: bytes = b"",
     *,
     clock: SessionClock | None = None,
-    **given: Any,
+    **start_values: Any,
 ) -> SessionStore:
     """Begin a session in a study's folder; any value of its ``SessionStart`` can be given."""
     values: dict[str, Any] = {"seed": 1, "operator": "", "language": "en", "device": {"name": "mouse"}, "screens": {}}
-    start = SessionStart(participant, **(values | {"simulated": False} | given))
+    start = SessionStart(participant, **(values | {"simulated": False} | start_values))
     if isinstance(study, Protocol):
         return begin_session(folder, study, source, start, clock=clock)
     return begin_session(folder, load(study), source_bytes(study), start, clock=clock)
@@ -59,7 +59,7 @@ def quick_pdfs() -> Iterator[None]:
 
 
 def made_up(name: str | Path) -> ConditionFeatures:
-    """What every condition of a study feels like: conditions differ in force and delay alone."""
+    """Return made-up features of every condition of a study, which differ only in force and delay."""
     study = load(name)
     return {
         (block.id, condition): (

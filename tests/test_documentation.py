@@ -49,7 +49,7 @@ RUN = [
 
 
 def faults(words: list[str], *, complete: bool) -> list[str]:
-    """Return what the program would refuse of a command's words; with ``complete`` also what is missing."""
+    """Return the errors that the program reports for a command line; with ``complete`` also missing options."""
     command: click.Command = commands
     path, rest = [PROGRAM], words[1:]
     while isinstance(command, click.Group) and rest and not rest[0].startswith("-"):
@@ -60,28 +60,30 @@ def faults(words: list[str], *, complete: bool) -> list[str]:
         command, path, rest = command.commands[rest[0]], [*path, rest[0]], rest[1:]
     context = click.Context(command, info_name=" ".join(path))
     try:
-        given, left, _ = command.make_parser(context).parse_args([word for word in rest if word not in {"…", "..."}])
+        options, extra_words, _ = command.make_parser(context).parse_args(
+            [word for word in rest if word not in {"…", "..."}]
+        )
     except click.UsageError as error:
         return [f"{' '.join(words)}: {error.format_message()}"]
-    found = [f"{' '.join(words)}: {' '.join(left)} is one word too many"] if left else []
+    errors = [f"{' '.join(words)}: {' '.join(extra_words)} is one word too many"] if extra_words else []
     for parameter in command.params:
-        value = given.get(parameter.name)
+        value = options.get(parameter.name)
         if isinstance(parameter.type, click.Choice) and isinstance(value, str) and not value.isupper():
-            found += [f"{' '.join(words)}: {value}" for _ in [0] if value not in parameter.type.choices]
+            errors += [f"{' '.join(words)}: {value}" for _ in [0] if value not in parameter.type.choices]
         if complete and parameter.required and value is None:
-            found.append(f"{' '.join(words)}: {parameter.name} is missing")
-    return found
+            errors.append(f"{' '.join(words)}: {parameter.name} is missing")
+    return errors
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_command_in_a_block_exists_with_its_options(page: Path) -> None:
-    found: list[str] = []
+    errors: list[str] = []
     for words in typed_commands(page):
         if Path(words[0]).name == PROGRAM:
-            found += faults(words, complete=True)
+            errors += faults(words, complete=True)
         elif Path(words[0]).stem.startswith("python") and len(words) > 1 and words[1].endswith(".py"):
-            found += [words[1]] if not (ROOT / words[1]).is_file() else []
-    assert not found
+            errors += [words[1]] if not (ROOT / words[1]).is_file() else []
+    assert not errors
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -101,18 +103,18 @@ def test_extras_and_scripts_that_a_page_names_exist(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_links_and_pictures_within_the_checkout_exist(page: Path) -> None:
-    found: list[str] = []
+    broken_links: list[str] = []
     for link in links(page):
         path, _, anchor = link.partition("#")
         if "://" in link or link.startswith("mailto:"):
             continue
         target = (page.parent / path).resolve() if path else page
         if not target.exists():
-            found.append(link)
+            broken_links.append(link)
         elif anchor and target.suffix == ".md":
             text = documentation.with_generated_parts(target.read_text(encoding="utf-8"))
-            found += [link] if anchor not in anchors(text) else []
-    assert not found
+            broken_links += [link] if anchor not in anchors(text) else []
+    assert not broken_links
 
 
 def test_every_page_is_in_one_section() -> None:
@@ -134,12 +136,14 @@ def test_the_book_and_its_layers_are_as_short_as_they_are_to_be() -> None:
 
 def test_every_page_but_decisions_is_in_the_list_of_a_section() -> None:
     top = documentation.folder()
-    shown = {link.partition("#")[0] for section in documentation.sections() for link in links(top / f"{section}.md")}
+    listed_pages = {
+        link.partition("#")[0] for section in documentation.sections() for link in links(top / f"{section}.md")
+    }
     here = {f"{page}.md" for page in documentation.names() if page not in documentation.sections()}
-    assert {page for page in here - shown if not page.startswith("decisions/")} == {"index.md"}
+    assert {page for page in here - listed_pages if not page.startswith("decisions/")} == {"index.md"}
 
 
-def test_the_page_on_installation_has_every_extra_and_none_for_sessions_alone() -> None:
+def test_the_page_on_installation_lists_every_extra() -> None:
     page = ROOT / "docs" / "install.md"
     text = page.read_text(encoding="utf-8")
     with (ROOT / "pyproject.toml").open("rb") as file:
@@ -153,26 +157,26 @@ def test_the_page_on_installation_has_every_extra_and_none_for_sessions_alone() 
 def test_packages_and_the_page_on_architecture_name_modules_that_exist() -> None:
     program = ROOT / "study_app"
     for package in program.glob("*/__init__.py"):
-        says = ast.get_docstring(ast.parse(package.read_text("utf-8"))) or ""
-        named = re.findall(r"``([a-z]\w*(?:\.\w+)*)``", says)
-        there = [one for one in named if [*package.parent.glob(f"{one.replace('.', '/')}*")]]
-        assert len(there) >= 3, f"{package.parent.name}: which three modules are to be read first?"
-        assert not [one for one in named if "." in one and one not in there], package.parent.name
+        docstring = ast.get_docstring(ast.parse(package.read_text("utf-8"))) or ""
+        names = re.findall(r"``([a-z]\w*(?:\.\w+)*)``", docstring)
+        existing = [name for name in names if [*package.parent.glob(f"{name.replace('.', '/')}*")]]
+        assert len(existing) >= 3, f"{package.parent.name}: which three modules are to be read first?"
+        assert not [name for name in names if "." in name and name not in existing], package.parent.name
     page = documentation.source("architecture")
     paths = re.findall(r"`((?:\w+/)*\w+\.py)`", page)
-    assert not [one for one in paths if not [*program.rglob(one), *(ROOT / "tests").rglob(one)]]
+    assert not [path for path in paths if not [*program.rglob(path), *(ROOT / "tests").rglob(path)]]
     packages = re.findall(r"^\| `(\w+)` \|", page.partition("## Data flow")[0], re.MULTILINE)
-    assert not [one for one in packages if not [*program.glob(f"{one}*")]]
+    assert not [package for package in packages if not [*program.glob(f"{package}*")]]
 
 
 def test_generated_parts_are_made_when_a_page_is_read() -> None:
-    made = {
+    generated_texts = {
         "commands": "`--participants",
         "data-dictionary": "`lateness_p99_ms`",
         "kinds": "`limiter_slope`",
         "designer-keys": "Ctrl+1",
     }
-    for page, words in made.items():
+    for page, words in generated_texts.items():
         assert words not in documentation.source(page)
         assert words in documentation.page(page)
         assert "<!-- generated" not in documentation.page(page)
@@ -194,10 +198,10 @@ def test_the_commands_of_a_page_run_one_after_the_other(page: Path, tmp_path: Pa
     for block in blocks(page):
         for line in lines_to_type(block) if block.run else ():
             command = line.replace("liquid-study ", f"{sys.executable} -m study_app ")
-            done = subprocess.run(
+            process = subprocess.run(
                 ["bash", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
             )
-            assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+            assert process.returncode == 0, f"{line}\n{process.stdout}\n{process.stderr}"
 
 
 @pytest.mark.nightly

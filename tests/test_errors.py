@@ -1,4 +1,4 @@
-"""Errors cross processes, each the same after pickling with its fields; suggested commands can be pasted."""
+"""Errors keep their fields when pickled between processes; suggested commands can be pasted."""
 
 import importlib
 import inspect
@@ -26,10 +26,11 @@ def example(kind: type[StudyError]) -> StudyError:
     """Return an error of a kind, with something for each of its arguments."""
     if kind.__init__ is Exception.__init__:
         return kind(f"what, value, hint of {kind.__name__}")
-    given: dict[str, Any] = {
-        name: GIVEN.get(str(one.annotation), f"the {name}") for name, one in inspect.signature(kind).parameters.items()
+    arguments: dict[str, Any] = {
+        name: GIVEN.get(str(parameter.annotation), f"the {name}")
+        for name, parameter in inspect.signature(kind).parameters.items()
     }
-    return kind(**given)
+    return kind(**arguments)
 
 
 @pytest.mark.slow
@@ -37,9 +38,9 @@ def test_every_error_is_the_same_after_pickling() -> None:
     for module in pkgutil.walk_packages(["study_app"], "study_app."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
-    found = {kind for kind in kinds(StudyError) if kind.__module__.startswith("study_app.")}
-    assert len(found) > 20
-    for error in map(example, found):
+    error_kinds = {kind for kind in kinds(StudyError) if kind.__module__.startswith("study_app.")}
+    assert len(error_kinds) > 20
+    for error in map(example, error_kinds):
         error.add_note("in case 3")
         again = pickle.loads(pickle.dumps(error))  # noqa: S301 - made here
         assert type(again) is type(error)

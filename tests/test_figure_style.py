@@ -17,8 +17,8 @@ def luminance(colour: str) -> float:
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-def contrast(one: str, other: str) -> float:
-    low, high = sorted((luminance(one), luminance(other)))
+def contrast(colour: str, other_colour: str) -> float:
+    low, high = sorted((luminance(colour), luminance(other_colour)))
     return (high + 0.05) / (low + 0.05)
 
 
@@ -29,13 +29,13 @@ def test_no_eye_takes_a_level_for_its_neighbour_or_its_opposite() -> None:
         assert mirrored > 25, eye
 
 
-def test_in_grey_neighbours_on_one_side_differ_and_sides_are_told_by_place() -> None:
+def test_in_grey_neighbouring_levels_of_a_side_differ() -> None:
     # Printed without colour both ends are dark: which side an answer is on is told by its place, never by the grey.
     greys = [luminance(colour) for colour in style.LEVEL_COLOURS]
     assert greys[:4] == sorted(greys[:4])
     assert greys[3:] == sorted(greys[3:], reverse=True)
-    for one, other in zip(style.LEVEL_COLOURS, style.LEVEL_COLOURS[1:], strict=False):
-        assert contrast(one, other) > 1.5
+    for colour, next_colour in zip(style.LEVEL_COLOURS, style.LEVEL_COLOURS[1:], strict=False):
+        assert contrast(colour, next_colour) > 1.5
 
 
 @pytest.mark.parametrize("level", range(1, 8))
@@ -56,25 +56,25 @@ def test_words_are_legible(ink: str, ground: str) -> None:
     assert contrast(ink, ground) >= 4.5
 
 
-def drawn() -> Figure:
+def drawn_figure() -> Figure:
     sheet = Sheet(100, 40, style.fonts())
     sheet.text(10, 20, "Text $kept$ as text")
     return sheet.figure
 
 
 def test_svg_keeps_text_as_text_without_reading_it_as_mathematics() -> None:
-    assert b"Text $kept$ as text" in style.file_bytes(drawn(), "svg", "Title")
+    assert b"Text $kept$ as text" in style.file_bytes(drawn_figure(), "svg", "Title")
 
 
 def test_pdf_embeds_truetype() -> None:
-    content = style.file_bytes(drawn(), "pdf", "Title")
+    content = style.file_bytes(drawn_figure(), "pdf", "Title")
     assert b"/CIDFontType2" in content
     assert b"/Type3" not in content
 
 
 @pytest.mark.parametrize("kind", style.FORMATS)
 def test_no_file_tells_a_date(kind: str) -> None:
-    content = style.file_bytes(drawn(), kind, "Title").lower()
+    content = style.file_bytes(drawn_figure(), kind, "Title").lower()
     for word in (b"creationdate", b"moddate", b"dc:date", b"creation time"):
         assert word not in content
 
@@ -82,9 +82,9 @@ def test_no_file_tells_a_date(kind: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", style.FORMATS)
 def test_the_users_settings_change_nothing_and_come_back(kind: str) -> None:
-    plain = style.file_bytes(drawn(), kind, "Title")
+    plain = style.file_bytes(drawn_figure(), kind, "Title")
     with mpl.rc_context({"savefig.bbox": "tight", "pdf.fonttype": 3, "svg.fonttype": "path", "path.simplify": False}):
-        assert style.file_bytes(drawn(), kind, "Title") == plain
+        assert style.file_bytes(drawn_figure(), kind, "Title") == plain
         assert mpl.rcParams["pdf.fonttype"] == 3
 
 

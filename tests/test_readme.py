@@ -37,8 +37,8 @@ def test_the_first_command_ends_in_the_demo_and_the_second_in_the_quick_tests() 
 
 
 def test_the_sample_is_sound_and_described_by_this_version() -> None:
-    done = CliRunner().invoke(commands, ["verify", str(ROOT / "results" / "sample-rek2024")])
-    assert (done.output, done.exit_code) == ("12 sessions: sound\n", 0)
+    result = CliRunner().invoke(commands, ["verify", str(ROOT / "results" / "sample-rek2024")])
+    assert (result.output, result.exit_code) == ("12 sessions: sound\n", 0)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def named_files(section: str) -> set[str]:
 
 @pytest.mark.nightly
 @needs_servo
-def test_the_tree_names_every_file_of_a_study_and_no_other(section: str, tmp_path: Path) -> None:
+def test_the_tree_names_exactly_the_files_of_a_study(section: str, tmp_path: Path) -> None:
     folder = rehearse("rek2024", participants=1, seed=1, results=tmp_path / "rek2024")
     exclude(folder, "P001", 1, by="AB", reason="a test")
     reveal(folder, by="AB", reason="a test")

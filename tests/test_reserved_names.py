@@ -22,7 +22,7 @@ from tests.windows_rules import RESERVED, is_valid_on_windows
 @example("CON")
 @example("com0.txt")
 @example("nul .toml")
-def test_the_rule_is_that_of_windows(name: str) -> None:
+def test_the_rule_equals_that_of_windows(name: str) -> None:
     assert bool(file_name_fault(name)) is not is_valid_on_windows(name)
 
 

@@ -1,4 +1,4 @@
-"""Tables that instruments and spreadsheets write: read in the one way that is possible, or refused by line."""
+"""Tables written by instruments and spreadsheets: read if unambiguous, otherwise refused by line."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Texts and what is made of them, in files that people review: ids, short names, and numbers as people type them."""
+"""IDs, short names and typed numbers made from texts, compared with reviewed files."""
 
 from pathlib import Path
 
@@ -14,5 +14,5 @@ PLAY = calls({"LONG": MAX_ID * "x", **{function.__name__: function for function 
 
 
 @pytest.mark.parametrize("file", sorted((Path(__file__).parent / "texts").iterdir()), ids=lambda file: file.stem)
-def test_what_is_made_of_a_text(file: Path, pytestconfig: pytest.Config) -> None:
+def test_texts_as_recorded(file: Path, pytestconfig: pytest.Config) -> None:
     compare(file, played(file, PLAY), pytestconfig, exact=True)

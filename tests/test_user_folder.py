@@ -1,4 +1,4 @@
-"""Where the user's settings are: where each system keeps them, or where a variable says."""
+"""The folder of the user's settings: the system's default, or that of a variable."""
 
 import sys
 from pathlib import Path

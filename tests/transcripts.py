@@ -21,15 +21,15 @@ Play = Callable[[str, list[str]], Iterator[str]]
 
 
 def played(file: Path, play: Play) -> list[str]:
-    """Return the lines of a file of transcripts with what the commands do now; in a file with `!` all is asserted."""
+    """Replay a file of transcripts; return its lines with the present output, or assert it in a file with `!`."""
     text, lines = file.read_text(encoding="utf-8"), list[str]()
     for part in text.removeprefix("=== ").split("\n=== "):
-        name, start, *told = part.strip("\n").split("\n")
+        name, start, *part_lines = part.strip("\n").split("\n")
         lines += [*[""] * bool(lines), f"=== {name}", start]
         asserted, did = list[list[str]](), list[tuple[str, list[str]]]()
-        for line in told:
+        for line in part_lines:
             asserted[-1].append(line) if line.startswith((">", "!")) else asserted.append([])
-        commands = [line for line in told if not line.startswith((">", "!"))]
+        commands = [line for line in part_lines if not line.startswith((">", "!"))]
         for line in play(start.removeprefix("start:").strip(), commands):
             did[-1][1].append(line) if line.startswith(">") else did.append((line, []))
         for (command, said), words in zip(did, asserted, strict=True):
@@ -45,10 +45,10 @@ def _has_words(words: str, said: str) -> bool:
 
 
 def every(folder: Path, names: str) -> list[Path]:
-    """Return the files of transcripts in a folder, which are these: one that is deleted is missed."""
-    found = sorted(folder.glob("*.txt"))
-    assert [path.stem for path in found] == names.split(), f"{folder} holds {[path.stem for path in found]}"
-    return found
+    """Return the transcript files in a folder; fail unless their names are ``names``."""
+    files = sorted(folder.glob("*.txt"))
+    assert [path.stem for path in files] == names.split(), f"{folder} holds {[path.stem for path in files]}"
+    return files
 
 
 def value_of(line: str, names: Mapping[str, Any]) -> Any:
@@ -57,8 +57,8 @@ def value_of(line: str, names: Mapping[str, Any]) -> Any:
     def value(node: ast.AST) -> Any:
         match node:
             case ast.Call(ast.Name(name), arguments, keywords):
-                given = {str(one.arg): value(one.value) for one in keywords}
-                return names[name](*map(value, arguments), **given)
+                named_arguments = {str(keyword.arg): value(keyword.value) for keyword in keywords}
+                return names[name](*map(value, arguments), **named_arguments)
             case ast.Name(name):
                 return names[name]
             case ast.List(items):
@@ -70,7 +70,7 @@ def value_of(line: str, names: Mapping[str, Any]) -> Any:
 
 
 def calls(names: Mapping[str, Any], *refusals: type[Exception]) -> Play:
-    """Return what plays calls: each with its value, or the words of its refusal."""
+    """Return a player of calls, which yields the value of each, or its refusal."""
 
     def play(_start: str, lines: list[str]) -> Iterator[str]:
         for line in lines:
@@ -84,19 +84,19 @@ def calls(names: Mapping[str, Any], *refusals: type[Exception]) -> Play:
 
 
 def acts(begin: Callable[[str], Any], names: Mapping[str, Any], words: Callable[[str], str] = str) -> Play:
-    """Return what plays methods of the world that begins at a start; each with what `told` yields, in ``words``."""
+    """Return a player of the methods of a world that ``begin`` makes; ``words`` formats each line of `told`."""
 
     def play(start: str, lines: list[str]) -> Iterator[str]:
         world = begin(start)
         for line in lines:
             yield line
-            yield from (f"> {words(one)}" for one in told(world, line, names))
+            yield from (f"> {words(text)}" for text in told(world, line, names))
 
     return play
 
 
 def told(world: Any, line: str, names: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what a method of a world, or a call of ``names``, says, or its refusal, and then the world's news."""
+    """Yield the output or refusal of a world's method, or of a call of ``names``, and then the world's news."""
     name = line.partition("(")[0]
     try:
         said = value_of(line, {**names, name: getattr(world, name)} if hasattr(world, name) else names)
@@ -107,7 +107,7 @@ def told(world: Any, line: str, names: Mapping[str, Any]) -> Iterator[str]:
 
 
 class Files:
-    """Files below a folder, and a command for whatever may happen to them."""
+    """Files below a folder, and a command for each change that may happen to them."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -118,16 +118,19 @@ class Files:
         return {path.relative_to(self.root).as_posix(): path.read_bytes() for path in paths}
 
     def files(self) -> Iterator[str]:
-        """Yield which files differ from what they were."""
+        """Yield the files that were added, deleted or changed."""
         now = self._contents()
         yield from (f"gone: {name}" for name in sorted(self.before.keys() - now.keys()))
         yield from (f"new: {name}" for name in sorted(now.keys() - self.before.keys()))
-        yield from (f"other: {one}" for one in sorted(now.keys() & self.before.keys()) if now[one] != self.before[one])
+        yield from (
+            f"other: {name}" for name in sorted(now.keys() & self.before.keys()) if now[name] != self.before[name]
+        )
 
     def same(self, folder: str, other: str) -> Iterator[str]:
-        """Yield which files of two folders differ."""
-        one, two = (Files(self.root / name)._contents() for name in (folder, other))
-        yield f"{len(one)} files, different: {sorted(name for name in one | two if one.get(name) != two.get(name))}"
+        """Yield the number of files in a folder, and the names that differ in another one."""
+        first, second = (Files(self.root / name)._contents() for name in (folder, other))
+        different = sorted(name for name in first | second if first.get(name) != second.get(name))
+        yield f"{len(first)} files, different: {different}"
 
     def replace(self, name: str, old: str, new: str) -> None:
         content = (self.root / name).read_bytes()
@@ -141,7 +144,7 @@ class Files:
         self.write(name, (self.root / name).read_bytes() + content)
 
     def cut(self, name: str, size: int) -> None:
-        """Leave so many bytes; with a negative number, all but the last ones."""
+        """Cut a file to this number of bytes; a negative number removes the last bytes."""
         self.write(name, (self.root / name).read_bytes()[:size])
 
     def delete(self, *names: str) -> None:

@@ -1,4 +1,4 @@
-"""What Windows refuses, for tests on other systems."""
+"""The restrictions of Windows on files, for tests on other systems."""
 
 import io
 import os
@@ -21,7 +21,7 @@ def is_valid_on_windows(name: str) -> bool:
 
 
 class Windows:
-    """The files that other programs have open, and how often each refused a change; ``calls`` limits refusals."""
+    """The files that other programs have open, with their refused changes; ``calls`` limits refusals."""
 
     def __init__(self) -> None:
         self.held: dict[Path, int] = {}
@@ -30,7 +30,7 @@ class Windows:
 
     @contextmanager
     def hold(self, path: Path, calls: int = 10_000, *, shared: bool = False) -> Iterator[None]:
-        """Have ``path`` open in another program, as Excel has a table, for at most so many refusals.
+        """Mark ``path`` as open in another program, as Excel does, for a maximum number of refusals.
 
         A ``shared`` file can be written by others, too, as those of Python can.
         """
@@ -63,30 +63,30 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> Windows:
     """Refuse to rename, replace, delete or write files that another program has open, as Windows does."""
     rules = Windows()
 
-    def refuse(name: str, checked: int) -> None:
-        real: Callable[..., Any] = getattr(os, name)
+    def check_calls_of(name: str, path_count: int) -> None:
+        original: Callable[..., Any] = getattr(os, name)
 
-        def call(*paths: Any, **given: Any) -> Any:
-            rules.check(*paths[:checked], longest=LONGEST_FOLDER if name == "mkdir" else LONGEST_PATH)
-            return real(*paths, **given)
+        def call(*paths: Any, **kwargs: Any) -> Any:
+            rules.check(*paths[:path_count], longest=LONGEST_FOLDER if name == "mkdir" else LONGEST_PATH)
+            return original(*paths, **kwargs)
 
         monkeypatch.setattr(os, name, call)
 
-    for name, checked in (("rename", 2), ("replace", 2), ("unlink", 1), ("remove", 1), ("mkdir", 1)):
-        refuse(name, checked)
-    opened = io.open
+    for name, path_count in (("rename", 2), ("replace", 2), ("unlink", 1), ("remove", 1), ("mkdir", 1)):
+        check_calls_of(name, path_count)
+    original_open = io.open
 
-    def open_file(file: Any, mode: str = "r", *words: Any, **given: Any) -> Any:
+    def open_file(file: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
         if not isinstance(file, int) and set(mode) & set("wax+"):
             rules.check(file, writes=True)
-        return opened(file, mode, *words, **given)
+        return original_open(file, mode, *args, **kwargs)
 
-    create = os.open
+    original_os_open = os.open
 
-    def open_descriptor(path: Any, flags: int, *words: Any, **given: Any) -> int:
+    def open_descriptor(path: Any, flags: int, *args: Any, **kwargs: Any) -> int:
         if flags & (os.O_WRONLY | os.O_RDWR):
             rules.check(path, writes=True)
-        return create(path, flags, *words, **given)
+        return original_os_open(path, flags, *args, **kwargs)
 
     monkeypatch.setattr(os, "open", open_descriptor)
     monkeypatch.setattr(io, "open", open_file)

@@ -67,7 +67,7 @@ def _polar(colour: Lab, stretch: float) -> tuple[float, float, float]:
 
 def smallest(palette: tuple[str, ...], eye: str) -> tuple[float, float]:
     """Return the smallest difference of neighbouring levels, and of a level and its mirror image (1 and 7, ...)."""
-    seen = [lab(colour, eye) for colour in palette]
-    neighbours = [ciede2000(a, b) for a, b in pairwise(seen)]
-    mirrored = [ciede2000(seen[place], seen[-1 - place]) for place in range(len(seen) // 2)]
+    lab_colours = [lab(colour, eye) for colour in palette]
+    neighbours = [ciede2000(a, b) for a, b in pairwise(lab_colours)]
+    mirrored = [ciede2000(lab_colours[place], lab_colours[-1 - place]) for place in range(len(lab_colours) // 2)]
     return min(neighbours), min(mirrored)

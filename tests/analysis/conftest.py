@@ -60,12 +60,12 @@ class Results:
         presented: list[dict[str, Any]] = []
         for trial in schedule.trials[:trials]:
             attempts = [(repeated or {})[trial.code]] if trial.code in (repeated or {}) else []
-            for attempt, given in enumerate([*attempts, answer], start=1):
+            for attempt, attempt_answer in enumerate([*attempts, answer], start=1):
                 place = self._place(participant, session, trial, attempt)
                 presented.append({**_blank(TRIALS), **place, "of": trial.of, **(changes or {})})
                 condition = self.key.condition(trial.block, trial.code)
                 responses += [
-                    {**_blank(RESPONSES), **place, **_answered(given(condition, item), item, number)}
+                    {**_blank(RESPONSES), **place, **_answered(attempt_answer(condition, item), item, number)}
                     for number, item in enumerate(trial.items, start=1)
                 ]
         folder = StudyFolder(self.folder).session(participant, session)
@@ -84,7 +84,7 @@ class Results:
         return StudyFolder(self.folder).session(participant, session).table(self.protocol.study.name, "trials")
 
     def exclude(self, participant: str, *, session: int = 1, trial: int | None = None, reason: str = "tired") -> None:
-        """Leave a session, or one trial of it, out of the analysis."""
+        """Exclude a session, or one trial of it, from the analysis."""
         new = Exclusion(
             participant=participant,
             session=session,
@@ -93,13 +93,13 @@ class Results:
             reason=reason,
             excluded_at="2026-01-06T10:00:00.000+01:00",
         )
-        listed = (*exclusions(self.folder), new)
-        StudyFolder(self.folder).exclusions.write_bytes(exclusion_bytes(listed))
+        all_exclusions = (*exclusions(self.folder), new)
+        StudyFolder(self.folder).exclusions.write_bytes(exclusion_bytes(all_exclusions))
 
     def trial(self, participant: str, condition: str, *, session: int = 1) -> int:
         """Return the number of the first trial in which a condition was presented."""
         trials = build_schedule(self.protocol, participant, seed=session).trials
-        return next(one.number for one in trials if self.key.condition(one.block, one.code) == condition)
+        return next(trial.number for trial in trials if self.key.condition(trial.block, trial.code) == condition)
 
     def open(self) -> None:
         """Open the key."""
@@ -107,7 +107,7 @@ class Results:
 
     def code(self, condition: str, block: str) -> str:
         """Return the code of a condition."""
-        return next(code for code, found in self.key.codes[block].items() if found == condition)
+        return next(code for code, code_condition in self.key.codes[block].items() if code_condition == condition)
 
     def _place(self, participant: str, session: int, trial: Trial, attempt: int) -> dict[str, Any]:
         return {
@@ -220,8 +220,8 @@ HIDDEN = ("zembla", "quorn", "1013.7", "877.3")
 
 
 @pytest.fixture
-def figures_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw PNG alone, which the page holds: every form is drawn anew, by the same code."""
+def png_figures_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write figures only as PNG, the format that the page embeds; the same code draws every other format again."""
     from study_app.analysis.report import write_report
 
     monkeypatch.setattr(write_report, "FORMATS", ("png",))

@@ -23,12 +23,12 @@ Presented = tuple[str, int, str, Sequence[int | None]]
 
 
 def delays(delays_ms: Sequence[float]) -> tuple[Setting, ...]:
-    """Return settings of one liquid, D1, D2 …, sorted as a study has them."""
-    made = [
+    """Return settings D1, D2 … of one liquid in the order of a study."""
+    settings = [
         Setting(code=f"D{place}", condition=f"delay_{place}", liquid="water", delay_ms=float(ms))
         for place, ms in enumerate(delays_ms, start=1)
     ]
-    return tuple(sorted(made, key=lambda setting: setting.delay_ms or 0.0))
+    return tuple(sorted(settings, key=lambda setting: setting.delay_ms or 0.0))
 
 
 def liquids(count: int) -> tuple[Setting, ...]:
@@ -41,7 +41,7 @@ def liquids(count: int) -> tuple[Setting, ...]:
 
 
 def study(settings: Sequence[Setting], trials: Sequence[Presented], decided: Decided = DECIDED) -> Study:
-    """Return a study of one block."""
+    """Return a study with one block."""
     kind = "delays" if settings[0].code.startswith("D") else "liquids"
     if kind == "liquids":
         decided = replace(decided, names=ITEMS)
@@ -56,7 +56,7 @@ def study(settings: Sequence[Setting], trials: Sequence[Presented], decided: Dec
         cannot_judge=None,
     )
     presented, answers = [], []
-    for number, (participant, session, code, given) in enumerate(trials, start=1):
+    for number, (participant, session, code, trial_answers) in enumerate(trials, start=1):
         place = {
             "study": "made_up",
             "participant": participant,
@@ -74,7 +74,7 @@ def study(settings: Sequence[Setting], trials: Sequence[Presented], decided: Dec
         presented.append(place)
         answers += [
             {**place, "item": item, "response": value, "cannot_judge": False}
-            for item, value in zip(ITEMS, given, strict=True)
+            for item, value in zip(ITEMS, trial_answers, strict=True)
         ]
     given_answers = table(RESPONSES, answers)
     visits = sorted({(participant, session) for participant, session, _, _ in trials})
@@ -96,13 +96,13 @@ def study(settings: Sequence[Setting], trials: Sequence[Presented], decided: Dec
 
 
 def table(columns: Sequence[Column], rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
-    """Return rows with all columns of a table, missing where a row has none, and all of them counting."""
-    made = {
+    """Return a data frame with all columns of a table; absent values are missing and every row counts."""
+    arrays = {
         column.name: pd.array([row.get(column.name) for row in rows], dtype=TYPES[column.kind])  # type: ignore[call-overload]
         for column in columns
     }
     status = pd.array(["completed"] * len(rows), dtype="string")
-    return pd.DataFrame(made).assign(session_status=status, excluded=False, exclusion_reason=None, counted=True)
+    return pd.DataFrame(arrays).assign(session_status=status, excluded=False, exclusion_reason=None, counted=True)
 
 
 def _visit(participant: str, session: int) -> dict[str, Any]:
@@ -140,5 +140,5 @@ def everybody(
         for session in range(1, sessions + 1):
             for _ in range(repetitions):
                 for setting in settings:
-                    given = [answer(person, session, setting.code, item) for item in ITEMS]
-                    yield f"P{person:03d}", session, setting.code, given
+                    answers = [answer(person, session, setting.code, item) for item in ITEMS]
+                    yield f"P{person:03d}", session, setting.code, answers

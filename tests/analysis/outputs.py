@@ -19,7 +19,7 @@ GOLDEN = Path(__file__).parent / "golden"
 
 @contextmanager
 def figures_as_lines() -> Iterator[None]:
-    """Let files of figures hold what these show."""
+    """Replace the content of figure files by the texts in the figures."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", stub_png)
         patched.setattr(write_report, "FORMATS", ("png",))

@@ -36,17 +36,19 @@ def drawn(rng: np.random.Generator) -> Study:
                     if rng.random() < missing / 3:
                         continue
                     wanted = rng.choice(levels, len(ITEMS)) + slope * place
-                    given = [None if rng.random() < missing else int(min(7, one)) for one in wanted]
-                    trials.append((f"P{person:03d}", session, setting.code, given))
-    made = rng.random() < 0.8
+                    answers_of_person = [None if rng.random() < missing else int(min(7, value)) for value in wanted]
+                    trials.append((f"P{person:03d}", session, setting.code, answers_of_person))
+    is_decided = rng.random() < 0.8
     bound = float(rng.choice([0.5, 1.0, 3.0]))
-    decided = replace(DECIDED, made=made, changed=bool(rng.random() < 0.2), equivalence_bound=bound if made else None)
+    decided = replace(
+        DECIDED, made=is_decided, changed=bool(rng.random() < 0.2), equivalence_bound=bound if is_decided else None
+    )
     decided = replace(decided, alpha=float(rng.choice([0.05, 0.05, 0.001])), primary=ITEMS[: int(rng.integers(0, 3))])
     return study(settings, trials, decided)
 
 
 def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
-    """Evaluate a study, write all its texts and draw its figures in these forms; return what is found.
+    """Evaluate a study, write its texts and draw its figures in these formats; return the results.
 
     Each finding has a value only in blocks that it is about, and only codes to speak of while the key is sealed.
     """
@@ -58,18 +60,18 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
     texts = [methods(made, results), *sections.limits(made, results)]
     page = first_page(results, sections.limits(made, results))
     texts.append(seen(re.sub(r'src="[^"]*"', 'src="#part-"', page)))
-    for found in results.blocks:
-        section = " ".join(block(found, results, figures, failures))
+    for block_result in results.blocks:
+        section = " ".join(block(block_result, results, figures, failures))
         texts.append(seen(re.sub(r'src="[^"]*"', 'src="#part-"', section)))
         for finding in all_findings():
-            if found.kind not in (finding.kinds if found.revealed else finding.sealed):
-                assert finding.value_in(found) == finding.empty, finding.key
-            here = finding(found, results)
-            told = [*here.limits(), *here.methods()]
-            assert all(text.endswith(".") for text in told), finding.key
-            assert all(row["block"] == found.id for row in here.rows()), finding.key
-    asked = [(one.block, one.question) for one in answers(results)]
-    assert len(set(asked)) == len(asked)
+            if block_result.kind not in (finding.kinds if block_result.revealed else finding.sealed):
+                assert finding.value_in(block_result) == finding.empty, finding.key
+            here = finding(block_result, results)
+            statements = [*here.limits(), *here.methods()]
+            assert all(text.endswith(".") for text in statements), finding.key
+            assert all(row["block"] == block_result.id for row in here.rows()), finding.key
+    questions = [(answer.block, answer.question) for answer in answers(results)]
+    assert len(set(questions)) == len(questions)
     assert failures.found == []
     for picture in figures:
         assert picture.caption.endswith(".")

@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from scipy.stats import ttest_ind, ttest_rel
 
 from study_app.analysis import contrasts
-from study_app.analysis.contrasts import _direction_words, answer, contrast_section
+from study_app.analysis.contrasts import _direction_text, answer, contrast_section
 from study_app.analysis.data.blocks import PlacedScore, QuestionPlace
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
@@ -86,7 +86,7 @@ def delayed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return rehearse_answers(folder / "delayed.toml", participants=6, seed=3, results=folder / "study", features={})
 
 
-@pytest.mark.usefixtures("figures_of_the_page")
+@pytest.mark.usefixtures("png_figures_only")
 def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_path: Path) -> None:
     assert load_study(delayed).contrasts == ()
     receipts = "".join(path.read_text("utf-8") for path in delayed.rglob("session.json"))
@@ -94,31 +94,39 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     assert '"contrasts"' not in receipts
     unblind(delayed, "AB", "to analyse")
     results = evaluate(load_study(delayed))
-    (found,) = results.contrasts
+    (contrast_result,) = results.contrasts
     study = load_study(delayed)
-    (late, prompt), shared = thresholds_compared(*sorted(study.levels, key=lambda one: one.id), tracks(study))
+    (late, prompt), shared = thresholds_compared(
+        *sorted(study.levels, key=lambda level_block: level_block.id), tracks(study)
+    )
     assert shared == 0, "blocks with the same levels and design have a width in common"
     expected = group_mean(
         [late[person].value - prompt[person].value for person in study.people],
         [late[person].variance + prompt[person].variance for person in study.people],
     )
-    assert (found.n, found.dropped, found.left_out, found.effect_name) == (6, 0, {}, "ratio")
-    assert found.interval is not None
-    assert (found.effect, found.interval.low, found.interval.high) == pytest.approx(
+    assert (contrast_result.n, contrast_result.dropped, contrast_result.left_out, contrast_result.effect_name) == (
+        6,
+        0,
+        {},
+        "ratio",
+    )
+    assert contrast_result.interval is not None
+    assert (contrast_result.effect, contrast_result.interval.low, contrast_result.interval.high) == pytest.approx(
         (10**expected.mean, 10**expected.low, 10**expected.high)
     )
     error = (expected.high - expected.low) / 2 / student.ppf(0.975, 5)
-    assert found.statistic == pytest.approx(expected.mean / error)
-    assert found.p == pytest.approx(student.sf(expected.mean / error, 5))
+    assert contrast_result.statistic == pytest.approx(expected.mean / error)
+    assert contrast_result.p == pytest.approx(student.sf(expected.mean / error, 5))
     least = (
         detectable_difference(6, alpha=results.decided.alpha, expected="higher")[1]
         * error
         * math.log(10)
         * math.sqrt(6)
     )
-    not_shown = replace(results, contrasts=(replace(found, verdict="not shown"),))
-    detected = f"a mean ratio must be at least {math.exp(least):.2f} (or at most {math.exp(-least):.2f}) to be detected"
-    assert any(detected in it for it in limits(study, not_shown))
+    not_shown = replace(results, contrasts=(replace(contrast_result, verdict="not shown"),))
+    ratios = f"at least {math.exp(least):.2f} (or at most {math.exp(-least):.2f})"
+    detected = f"the true mean ratio must be {ratios} to be detected"
+    assert any(detected in line for line in limits(study, not_shown))
     page = report(delayed, tmp_path / "report", failed=pytest.fail)[0].read_text(encoding="utf-8")
     first = page[page.index('class="first"') :].replace("\u00a0", " ")
     standard = (
@@ -127,30 +135,34 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     assert f"In the block “Late” (two-interval forced choice, 20 trials per participant), {standard}" in first
     words, trials = methods(study, results), "(two-interval forced choice, 20 trials per participant)"
     for title, delay in (("Late", " with a visual delay of 60 ms"), ("Prompt", "")):
-        said = rf"In “{title}” {re.escape(trials)}, damping at the hand was judged at Weber fractions from \S+ to \S+ "
-        assert re.search(rf"{said}for a standard of 8 N·s/m{delay}; levels were chosen by ", words)
+        message = (
+            rf"In “{title}” {re.escape(trials)}, damping at the hand was judged at Weber fractions from \S+ to \S+ "
+        )
+        assert re.search(rf"{message}for a standard of 8 N·s/m{delay}; levels were chosen by ", words)
     apart = "Late (60 ms of visual delay) than in Prompt (no visual delay)"
-    asked = f"Threshold is higher in {apart}, with an equivalence bound of 1.25"
-    assert first.index(asked) < first.index("Prompt: ")
-    assert f"; mean ratio {found.effect:.2f}, two-sided 95 % confidence interval" in first
-    for side, own in zip(found.sides, (late, prompt), strict=True):
+    hypothesis = f"The threshold is higher in {apart}, with an equivalence bound of 1.25"
+    assert first.index(hypothesis) < first.index("Prompt: ")
+    assert f"; mean ratio {contrast_result.effect:.2f}, two-sided 95 % confidence interval" in first
+    for side, own in zip(contrast_result.sides, (late, prompt), strict=True):
         assert side.values == pytest.approx({person: 10 ** own[person].value for person in study.people})
         half = math.log(side.high / side.low) / 2
         assert side.standard_error == pytest.approx(half / student.ppf(0.975, 5)), "of the mean, which is weighted"
-    tables = "".join(contrast_section(replace(results, contrasts=(replace(found, standard_error=4.0),))))
+    tables = "".join(contrast_section(replace(results, contrasts=(replace(contrast_result, standard_error=4.0),))))
     of_ratio = [line.split(" | ") for line in page_lines(tables) if line.startswith("Threshold: Late ÷ Prompt | 6 | ")]
     assert [of_ratio[0][-5], of_ratio[1][-1]] == ["4.00"] * 2, "tested, and described"
 
 
 def test_methods_name_all_compared_conditions_with_their_delays(guessed: tuple[Study, Results]) -> None:
     study, words = guessed[0], methods(*guessed)
-    held = study.trials[study.trials["counted"] & study.trials["block"].isin([level.id for level in study.levels])]
-    (trials,) = set(held.groupby(["participant", "block"]).size())
+    counted_trials = study.trials[
+        study.trials["counted"] & study.trials["block"].isin([level.id for level in study.levels])
+    ]
+    (trials,) = set(counted_trials.groupby(["participant", "block"]).size())
     design = f"(two-interval forced choice, {counted(trials, 'trial')} per participant)"
     assert f"{design}, damper and damper with a visual delay of 60 ms were compared." in words
 
 
-def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_block(tmp_path: Path) -> None:
+def test_staircase_thresholds_include_everybody_and_name_those_without_a_block(tmp_path: Path) -> None:
     """A 3-down-1-up track stays above the threshold, which may therefore lie below all levels that a person met."""
     method = 'kind = "updown", rule = "3down1up", tracks = 2, trials = 24'
     text = DELAYED.replace('kind = "questplus", trials = 20', method).replace("participants = 6", "participants = 8")
@@ -160,18 +172,24 @@ def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_bl
     study = load_study(folder)
     met = tracks(study).groupby(["participant", "block"])["level"].min()
     below = [
-        one
+        estimate
         for level in evaluate(study).levels
-        for one in Thresholds.participant_rows(level)
-        if one.threshold < met[one.participant, level.block]
+        for estimate in Thresholds.participant_rows(level)
+        if estimate.threshold < met[estimate.participant, level.block]
     ]
     assert below, "some thresholds lie below all levels that the person met"
-    assert {one.beyond for one in below if one.threshold > 0.02} == {None}, "the stimulus has lower levels"
-    (found,) = evaluate(study).contrasts
-    assert (found.n, found.dropped, found.left_out) == (8, 0, {})
-    gone = study.trials[~((study.trials["participant"] == "P003") & (study.trials["block"] == "late"))]
-    (found,) = (results := evaluate(replace(study, trials=gone))).contrasts
-    assert (found.n, found.dropped, found.left_out) == (7, 1, {"P003": "no threshold in Late"})
+    assert {estimate.beyond for estimate in below if estimate.threshold > 0.02} == {None}, (
+        "the stimulus has lower levels"
+    )
+    (contrast_result,) = evaluate(study).contrasts
+    assert (contrast_result.n, contrast_result.dropped, contrast_result.left_out) == (8, 0, {})
+    remaining_trials = study.trials[~((study.trials["participant"] == "P003") & (study.trials["block"] == "late"))]
+    (contrast_result,) = (results := evaluate(replace(study, trials=remaining_trials))).contrasts
+    assert (contrast_result.n, contrast_result.dropped, contrast_result.left_out) == (
+        7,
+        1,
+        {"P003": "no threshold in Late"},
+    )
     assert "Excluded: P003 (no threshold in Late)." in first_page(results, ())
     words = "Participants are included if both of their values are available, even if a threshold lies outside"
     assert words in preregistration(parse(text.encode(), "delayed.toml"), "0" * 64)
@@ -181,8 +199,10 @@ def test_equality_is_corrected_over_the_hypotheses_that_state_a_bound() -> None:
     first = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"), bound=1.0)
     second = Contrast(measure=ITEMS[1], blocks=("b",), conditions=("c2", "c1"), bound=1.0)
     third = Contrast(measure=ITEMS[1], blocks=("b",), conditions=("c3", "c1"))
-    made = statements(first)
-    alone, both = (evaluate(replace(made, contrasts=some)).contrasts for some in ((first,), (first, second, third)))
+    case_study = statements(first)
+    alone, both = (
+        evaluate(replace(case_study, contrasts=some)).contrasts for some in ((first,), (first, second, third))
+    )
     # Of 20 participants none may belong to a minority of one in six, who shift the mean by a point: p = (5 / 6)^20.
     assert alone[0].p_equivalent == pytest.approx((5 / 6) ** 20)
     assert both[0].p_equivalent == pytest.approx(2 * (5 / 6) ** 20)
@@ -192,11 +212,11 @@ def test_equality_is_corrected_over_the_hypotheses_that_state_a_bound() -> None:
 
 def statements(contrast: Contrast, shift: float = 0.0) -> Study:
     rng = np.random.default_rng(5)
-    made = study(
+    case_study = study(
         liquids(3),
         list(everybody(liquids(3), 20, lambda _p, _s, code, _i: round(rng.normal(4 + shift * (code == "L2"), 0.6)))),
     )
-    return replace(made, contrasts=(contrast,))
+    return replace(case_study, contrasts=(contrast,))
 
 
 def test_two_conditions_of_a_statement_are_compared_and_can_be_equivalent() -> None:
@@ -220,24 +240,24 @@ def test_two_conditions_of_a_statement_are_compared_and_can_be_equivalent() -> N
 
 def test_a_difference_that_is_the_same_for_all_is_not_called_equivalent() -> None:
     contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"), bound=1.0)
-    made = study(liquids(3), list(everybody(liquids(3), 12, lambda _p, _s, code, _i: 2 + 2 * (code == "L2"))))
-    (found,) = evaluate(replace(made, contrasts=(contrast,))).contrasts
-    assert (found.effect, found.equivalent) == (2.0, False)
-    assert "All differences lie outside the equivalence bounds (not equivalent)." in answer(found)
+    case_study = study(liquids(3), list(everybody(liquids(3), 12, lambda _p, _s, code, _i: 2 + 2 * (code == "L2"))))
+    (contrast_result,) = evaluate(replace(case_study, contrasts=(contrast,))).contrasts
+    assert (contrast_result.effect, contrast_result.equivalent) == (2.0, False)
+    assert "All differences lie outside the equivalence bounds (not equivalent)." in answer(contrast_result)
 
 
 def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
     contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"), bound=1.0)
     other = Contrast(measure=ITEMS[1], blocks=("b",), conditions=("c3", "c1"), expected="higher")
-    made = replace(statements(contrast), contrasts=(contrast, other))
-    told = methods(made, evaluate(made))
+    case_study = replace(statements(contrast), contrasts=(contrast, other))
+    methods_lines = methods(case_study, evaluate(case_study))
     for place, (stated, item, sides) in enumerate([(contrast, ITEMS[0], "two"), (other, ITEMS[1], "one")], start=1):
         words = stated.described(measure=f"agreement with “{item.capitalize()}”", block="Block")
-        assert f"Hypothesis {place} ({words}) was tested with a {sides}-sided paired t test." in told
-    assert "The reported p value is the largest of the three, Holm-adjusted across 2 hypotheses." in told
-    assert "Equivalence was tested with two one-sided t tests" in told
-    assert "Means were used for the hypotheses" in told
-    assert "never means" not in told
+        assert f"Hypothesis {place} ({words}) was tested with a {sides}-sided paired t test." in methods_lines
+    assert "The reported p value is the largest of the three, Holm-adjusted across 2 hypotheses." in methods_lines
+    assert "Equivalence was tested with two one-sided t tests" in methods_lines
+    assert "Means were used for the hypotheses" in methods_lines
+    assert "never means" not in methods_lines
     rows = write_report.tests_csv(evaluate(statements(contrast))).decode().splitlines()
     assert "hypotheses" in rows[1]
 
@@ -272,10 +292,10 @@ def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) ->
     assert (result.effect, result.standard_error) == pytest.approx((differences.mean(), differences.sem()))
     with quick_pdfs():
         page = report(folder, tmp_path / "report")[0].read_text(encoding="utf-8")
-    told, comparison = seen(page).replace("\u00a0", " "), "NASA-TLX raw score: Late − Prompt"
-    apart = "NASA-TLX raw score differs between Late (60 ms of visual delay) and Prompt (no visual delay)"
-    assert f"Hypothesis: {apart} not significant" in told
-    assert "The scale ranges from 0 to 100." in told
+    page_text, comparison = seen(page).replace("\u00a0", " "), "NASA-TLX raw score: Late − Prompt"
+    apart = "The NASA-TLX raw score differs between Late (60 ms of visual delay) and Prompt (no visual delay)"
+    assert f"Hypothesis: {apart} not significant" in page_text
+    assert "The scale ranges from 0 to 100." in page_text
     ends = [_shown(end) for end in expected.confidence_interval()]
     tested = [
         _shown(expected.statistic),
@@ -293,14 +313,17 @@ def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) ->
         bayes,
         "not significant",
     ]
-    assert " ".join(row) in told
+    assert " ".join(row) in page_text
     for name, values in (
         (comparison, differences),
         *((f"NASA-TLX raw score: {block.capitalize()}", raw[block]) for block in raw),
     ):
-        assert " ".join([name, "6", *map(_shown, (values.mean(), values.median(), values.std(), values.sem()))]) in told
-    assert "NASA-TLX, after each block" in told
-    assert "The mean NASA-TLX raw score was" not in told, "the hypothesis says it"
+        assert (
+            " ".join([name, "6", *map(_shown, (values.mean(), values.median(), values.std(), values.sem()))])
+            in page_text
+        )
+    assert "NASA-TLX, after each block" in page_text
+    assert "The mean NASA-TLX raw score was" not in page_text, "the hypothesis says it"
     assert "d<sub>z</sub>" in page
     assert "d_z" not in page
     assert "dz is the mean" in (tmp_path / "report" / "methods.txt").read_text("utf-8")
@@ -309,10 +332,10 @@ def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) ->
 
 def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> None:
     protocol = parse(LOADED.encode(), "loaded.toml")
-    told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found={}))
+    page_text = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found={}))
     half, smallest = detectable_difference(18, alpha=0.05, expected=None)
-    assert "“raw” (load) differs between Late and Prompt" in told
-    assert f"| raw | 18 | 1 | ±{half:.2f} SD | ±{smallest:.2f} SD |" in told
+    assert "“raw” (load) differs between Late and Prompt" in page_text
+    assert f"| raw | 18 | 1 | ±{half:.2f} SD | ±{smallest:.2f} SD |" in page_text
 
 
 @pytest.mark.parametrize(
@@ -330,55 +353,64 @@ def test_a_form_that_blocks_do_not_have_in_common_is_refused(before: str, after:
 
 def test_two_groups_are_compared_with_unequal_variances() -> None:
     contrast = Contrast(measure=ITEMS[0], blocks=("b",), groups=("one", "two"))
-    made = statements(contrast)
-    people = sorted(made.trials["participant"].unique())
+    case_study = statements(contrast)
+    people = sorted(case_study.trials["participant"].unique())
     members = {person: "one" if number % 3 else "two" for number, person in enumerate(people)}
-    made = replace(made, trials=made.trials.assign(group=made.trials["participant"].map(members).astype("string")))
-    (found,) = evaluate(made).contrasts
-    rows = made.responses[made.responses["item"] == ITEMS[0]]
+    case_study = replace(
+        case_study,
+        trials=case_study.trials.assign(group=case_study.trials["participant"].map(members).astype("string")),
+    )
+    (contrast_result,) = evaluate(case_study).contrasts
+    rows = case_study.responses[case_study.responses["item"] == ITEMS[0]]
     means = rows["response"].astype(float).groupby(rows["participant"]).mean()
-    one, two = (means[[person for person in people if members[person] == group]] for group in ("one", "two"))
-    t = ttest_ind(one, two, equal_var=False).statistic
-    assert (found.statistic, found.p) == pytest.approx((t, 2 * student.sf(abs(t), min(len(one), len(two)) - 1)))
-    assert found.effect == pytest.approx(one.mean() - two.mean())
+    first, second = (means[[person for person in people if members[person] == group]] for group in ("one", "two"))
+    t = ttest_ind(first, second, equal_var=False).statistic
+    assert (contrast_result.statistic, contrast_result.p) == pytest.approx(
+        (t, 2 * student.sf(abs(t), min(len(first), len(second)) - 1))
+    )
+    assert contrast_result.effect == pytest.approx(first.mean() - second.mean())
 
 
 def test_limits_of_the_study_are_the_power_of_its_hypotheses_and_groups_that_existed() -> None:
     contrast = Contrast(measure=ITEMS[0], blocks=("b",), groups=("one", "two"))
     paired = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c3", "c1"), expected="higher")
-    made = replace(statements(contrast, 2.0), contrasts=(contrast, paired))
-    people = sorted(made.trials["participant"].unique())
+    case_study = replace(statements(contrast, 2.0), contrasts=(contrast, paired))
+    people = sorted(case_study.trials["participant"].unique())
     members = {person: "one" if number % 3 else "two" for number, person in enumerate(people)}
     groups = {"groups": {"one": {}, "two": {}}, "study": {"group_assignment": "pre-existing"}}
-    made = replace(
-        made,
-        protocol={**made.protocol, **groups},
-        trials=made.trials.assign(group=made.trials["participant"].map(members).astype("string")),
+    case_study = replace(
+        case_study,
+        protocol={**case_study.protocol, **groups},
+        trials=case_study.trials.assign(group=case_study.trials["participant"].map(members).astype("string")),
     )
-    told = limits(made, results := evaluate(made))
+    limitation_lines = limits(case_study, results := evaluate(case_study))
     assert [result.verdict for result in results.contrasts] == ["not shown", "not shown"]
-    rows = made.responses[made.responses["item"] == ITEMS[0]].assign(value=lambda it: it["response"].astype(float))
+    rows = case_study.responses[case_study.responses["item"] == ITEMS[0]].assign(
+        value=lambda it: it["response"].astype(float)
+    )
     means = rows.groupby("participant")["value"].mean()
-    one, two = (means[[person for person in people if members[person] == group]] for group in ("one", "two"))
-    pooled = math.sqrt(((len(one) - 1) * one.var() + (len(two) - 1) * two.var()) / (len(people) - 2))
+    first, second = (means[[person for person in people if members[person] == group]] for group in ("one", "two"))
+    pooled = math.sqrt(((len(first) - 1) * first.var() + (len(second) - 1) * second.var()) / (len(people) - 2))
     settings = rows.pivot_table("value", "participant", "code")
     spread = (settings["L3"] - settings["L1"]).std()
     alpha = results.decided.alpha / 2
     leasts = (
-        pooled * detectable_difference(len(one), len(two), alpha=alpha, expected=None)[1],
+        pooled * detectable_difference(len(first), len(second), alpha=alpha, expected=None)[1],
         spread * detectable_difference(len(people), alpha=alpha, expected="higher")[1],
     )
     for place, least in enumerate(leasts, start=1):
-        line = next(line for line in told if line.startswith(f"Hypothesis {place}: with {len(people)} participants"))
+        line = next(
+            line for line in limitation_lines if line.startswith(f"Hypothesis {place}: with {len(people)} participants")
+        )
         assert f"must be at least {least:.2f} to be detected with 80 % power" in line
-    assert any(line.startswith("Participants were not assigned to groups at random") for line in told)
+    assert any(line.startswith("Participants were not assigned to groups at random") for line in limitation_lines)
 
 
 def test_a_hypothesis_names_titles_of_several_words_in_quotation_marks() -> None:
     interaction = Contrast(measure="d_prime", blocks=("prompt", "late"), groups=("novice", "expert"))
     difference = "the difference in sensitivity (d′) between “No delay” and “80 ms late”"
-    said = interaction.described(within=("No delay", "80 ms late"))
-    assert said == f"{difference} differs between novice and expert (interaction)"
+    description = interaction.described(within=("No delay", "80 ms late"))
+    assert description == f"{difference} differs between novice and expert (interaction)"
     paired = Contrast(measure="sure", form="after", blocks=("prompt", "late"), expected="higher")
     words = paired.described(("No delay", "Late"), measure="“Sure” (Your impression)")
     assert words == "“Sure” (Your impression) is higher in “No delay” than in Late"
@@ -386,44 +418,52 @@ def test_a_hypothesis_names_titles_of_several_words_in_quotation_marks() -> None
 
 def test_an_interaction_compares_groups_in_the_difference_of_each_participant() -> None:
     contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"), groups=("one", "two"))
-    made = statements(contrast)
-    people = sorted(made.trials["participant"].unique())
+    case_study = statements(contrast)
+    people = sorted(case_study.trials["participant"].unique())
     members = {person: "one" if number % 3 else "two" for number, person in enumerate(people)}
-    rows = made.responses["participant"].map(members).eq("one") & made.responses["code"].eq("L2")
+    rows = case_study.responses["participant"].map(members).eq("one") & case_study.responses["code"].eq("L2")
     assert rows.any()
-    value = made.responses["response"].astype(float) + 2.0 * rows.astype(float)
-    raised = made.responses.assign(value=value, response=value.map("{:g}".format).astype("string"))
-    made = replace(
-        made,
-        responses=raised,
-        trials=made.trials.assign(group=made.trials["participant"].map(members).astype("string")),
+    value = case_study.responses["response"].astype(float) + 2.0 * rows.astype(float)
+    shifted_answers = case_study.responses.assign(value=value, response=value.map("{:g}".format).astype("string"))
+    case_study = replace(
+        case_study,
+        responses=shifted_answers,
+        trials=case_study.trials.assign(group=case_study.trials["participant"].map(members).astype("string")),
     )
-    (result,) = evaluate(made).contrasts
+    (result,) = evaluate(case_study).contrasts
 
-    answers = raised[raised["item"] == ITEMS[0]].pivot_table("value", "participant", "code").astype(float)
+    answers = (
+        shifted_answers[shifted_answers["item"] == ITEMS[0]].pivot_table("value", "participant", "code").astype(float)
+    )
     differences = answers["L2"] - answers["L1"]
-    one, two = (differences[[person for person in people if members[person] == group]] for group in ("one", "two"))
-    t = ttest_ind(one, two, equal_var=False).statistic
-    assert (result.statistic, result.p) == pytest.approx((t, 2 * student.sf(abs(t), min(len(one), len(two)) - 1)))
-    assert result.effect == pytest.approx(one.mean() - two.mean())
+    first_group, second_group = (
+        differences[[person for person in people if members[person] == group]] for group in ("one", "two")
+    )
+    t = ttest_ind(first_group, second_group, equal_var=False).statistic
+    assert (result.statistic, result.p) == pytest.approx(
+        (t, 2 * student.sf(abs(t), min(len(first_group), len(second_group)) - 1))
+    )
+    assert result.effect == pytest.approx(first_group.mean() - second_group.mean())
     assert result.verdict == "shown"
     difference = f"difference in agreement with “{ITEMS[0].capitalize()}” between c2 and c1 in Block"
     assert f"The {difference} was higher in one than in two" in answer(result)
-    assert f"the {difference} differs between one and two" in methods(made, evaluate(made))
-    assert [len(side.values) for side in result.sides] == [len(one), len(two)]
+    assert f"the {difference} differs between one and two" in methods(case_study, evaluate(case_study))
+    assert [len(side.values) for side in result.sides] == [len(first_group), len(second_group)]
     figure = next(
         picture
-        for picture in draw_figures(write_report.summary_figure_tasks(made, evaluate(made), {}, ("svg",)))
+        for picture in draw_figures(write_report.summary_figure_tasks(case_study, evaluate(case_study), {}, ("svg",)))
         if "hypothesis" in picture.name
     )
-    tasks = list(write_report.summary_figure_tasks(replace(made, split="one"), evaluate(made), {}, ("svg",)))
+    tasks = list(
+        write_report.summary_figure_tasks(replace(case_study, split="one"), evaluate(case_study), {}, ("svg",))
+    )
     assert tasks == [], "the figures of one group do not compare it with the other"
-    drawn = figure.files["svg"].decode()
-    assert ">Difference: c2 − c1<" in drawn
-    assert ">one − two<" in drawn
-    cells = [answers[code].loc[group.index] for group in (one, two) for code in ("L2", "L1")]
+    svg = figure.files["svg"].decode()
+    assert ">Difference: c2 − c1<" in svg
+    assert ">one − two<" in svg
+    cells = [answers[code].loc[group.index] for group in (first_group, second_group) for code in ("L2", "L1")]
     assert [cell.mean for cell in result.cells] == pytest.approx([cell.mean() for cell in cells])
-    (card, *_) = cards(evaluate(made), presented={"b": Presented("In B, honey was presented.")})
+    (card, *_) = cards(evaluate(case_study), presented={"b": Presented("In B, honey was presented.")})
     means = [f"{cell.mean():.2f} [" for cell in cells]
     assert [card.badge, card.sentences[-1]] == ["significant", "In B, honey was presented."]
     for group, (first, second), sentence in zip(
@@ -443,23 +483,25 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
         {"blocks": ("a",)},
     ],
 )
-def test_what_is_no_comparison_of_two_is_refused(keys: dict[str, tuple[str, ...]]) -> None:
+def test_a_hypothesis_that_does_not_compare_two_sides_is_refused(keys: dict[str, tuple[str, ...]]) -> None:
     with pytest.raises(ValidationError):
         Contrast.model_validate({"measure": "d_prime", **keys})
 
 
-def test_power_tells_the_smallest_interaction() -> None:
+def test_power_states_the_smallest_detectable_interaction() -> None:
     text = "\n".join(line for line in DELAYED.splitlines() if not line.startswith("contrasts"))
     protocol = grouped(text, "threshold", 'late", "prompt', '["late", "prompt"]')
     error = math.log(1.3) / math.sqrt(2)  # the SD of the two errors is ln 1.3
-    found = {
+    results = {
         (block, 20): PrecisionResult([np.array([[error], [-error]])], [np.full(2, 0.2)]) for block in ("late", "prompt")
     }
-    told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found=found))
+    page_text = threshold_markdown(
+        Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found=results)
+    )
     spread = math.hypot(math.log(1.2), math.log(1.3), math.log(1.3))
     half, smallest = (math.exp(spread * end) for end in detectable_difference(12, 6, alpha=0.05, expected=None))
-    assert "the difference in threshold between Late and Prompt differs between a and b (interaction)" in told
-    assert f"| 20 | 18 | ×/÷ {math.exp(spread):.2f} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
+    assert "the difference in threshold between Late and Prompt differs between a and b (interaction)" in page_text
+    assert f"| 20 | 18 | ×/÷ {math.exp(spread):.2f} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in page_text
     text, _, rest = source_bytes("rek2024").decode().partition("sequence = ")
     sequence, _, rest = rest.partition("]")
     alone = grouped(text + rest, "different", "delays", f"{sequence}]")
@@ -471,14 +513,14 @@ def test_power_tells_the_smallest_interaction() -> None:
     planned = plan(protocol, felt_in(protocol))
     name, kind = next(iter(planned.kinds.items()))
     powers_ = Powers(plan=planned, sizes=(18,), studies=1, asked=1, seed=1, kinds={name: ()})
-    told = power_markdown(powers_)
+    page_text = power_markdown(powers_)
     place = [block.id for block in planned.blocks].index("delays")
     block = planned.blocks[place]
-    item = [one.id for one in block.items].index("different")
-    given = draw_opinions(planned, 4000, 1, 0)[place].answers(1.0, kind)[:, :, item]
-    rows = [[one.condition for one in block.settings].index(condition) for condition in (first, second)]
-    spread = float((given[:, rows[0]] - given[:, rows[1]]).std(ddof=1))
-    row = next(line for line in told.splitlines() if line.startswith("| different"))
+    item = [item.id for item in block.items].index("different")
+    opinions = draw_opinions(planned, 4000, 1, 0)[place].answers(1.0, kind)[:, :, item]
+    rows = [[setting.condition for setting in block.settings].index(condition) for condition in (first, second)]
+    spread = float((opinions[:, rows[0]] - opinions[:, rows[1]]).std(ddof=1))
+    row = next(line for line in page_text.splitlines() if line.startswith("| different"))
     assert float(row.split("|")[3]) == pytest.approx(spread, rel=0.1)
 
 
@@ -492,11 +534,11 @@ def test_power_tells_the_smallest_interaction() -> None:
 )
 def test_a_difference_agrees_with_the_means_beside_it(first: float, second: float, said: tuple[str, ...]) -> None:
     contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"))
-    (found,) = evaluate(statements(contrast, 0.5)).contrasts
+    (contrast_result,) = evaluate(statements(contrast, 0.5)).contrasts
     means = (first, second)
-    sides = tuple(replace(side, mean=mean) for side, mean in zip(found.sides, means, strict=True))
-    told = answer(replace(found, sides=sides, effect=first - second))
-    assert all(words in told for words in said), told
+    sides = tuple(replace(side, mean=mean) for side, mean in zip(contrast_result.sides, means, strict=True))
+    sentence = answer(replace(contrast_result, sides=sides, effect=first - second))
+    assert all(words in sentence for words in said), sentence
 
 
 def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> None:
@@ -505,9 +547,9 @@ def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> 
     first, second = evaluate(replace(statements(contrast, 0.5), contrasts=(contrast, alike))).contrasts
     assert first.p is not None
     assert first.p_adjusted == pytest.approx(2 * max(first.p, first.p_bootstrap, first.p_skewed))
-    told = re.search(r"; bootstrap p = (\.\d+); skewness-corrected t p = (\.\d+)$", first.method)
-    assert told is not None
-    assert [float(p) for p in told.groups()] == pytest.approx([first.p_bootstrap, first.p_skewed], abs=0.001)
+    match = re.search(r"; bootstrap p = (\.\d+); skewness-corrected t p = (\.\d+)$", first.method)
+    assert match is not None
+    assert [float(p) for p in match.groups()] == pytest.approx([first.p_bootstrap, first.p_skewed], abs=0.001)
     assert abs(first.p_bootstrap - first.p_skewed) > 0.005
     assert (second.verdict, second.p) == ("not tested", None)
     assert second.note.startswith("fewer than two participants have both values")
@@ -543,32 +585,32 @@ def test_a_hypothesis_is_about_a_measure_that_the_design_determines(block: str, 
                 grouped(text, measure, block, sequence)
 
 
-def test_power_tells_the_smallest_difference_between_groups() -> None:
+def test_power_states_the_smallest_detectable_difference_between_groups() -> None:
     text = "\n".join(line for line in DELAYED.splitlines() if not line.startswith("contrasts"))
     error = math.log(1.3) / math.sqrt(2)  # the SD of the two errors is ln 1.3
-    found = {("late", 20): PrecisionResult([np.array([[error], [-error]])], [np.full(2, 0.2)])}
+    results = {("late", 20): PrecisionResult([np.array([[error], [-error]])], [np.full(2, 0.2)])}
     for share, sizes in (1, "Each group contains 50 %"), (2, "The two groups contain 67 % and 33 %"):
         protocol = grouped(text, "threshold", "late", '["late", "prompt"]', share)
-        precisions = Precisions(protocol=protocol, sizes=(3, 18), studies=10, asked=10, seed=1, found=found)
-        told = threshold_markdown(precisions)
-        assert f"{sizes} of the participants." in told
+        precisions = Precisions(protocol=protocol, sizes=(3, 18), studies=10, asked=10, seed=1, found=results)
+        page_text = threshold_markdown(precisions)
+        assert f"{sizes} of the participants." in page_text
     spread = math.hypot(math.log(1.2), math.log(1.3))
-    assert f"| 20 | 3 | ×/÷ {math.exp(spread):.2f} | too few | too few |" in told
+    assert f"| 20 | 3 | ×/÷ {math.exp(spread):.2f} | too few | too few |" in page_text
     half, smallest = (math.exp(spread * end) for end in detectable_difference(12, 6, alpha=0.05, expected=None))
     root = spread * math.sqrt(1 / 12 + 1 / 6)
     assert half == pytest.approx(math.exp(student.ppf(0.975, 5) * root))
-    assert f"| 20 | 18 | ×/÷ {math.exp(spread):.2f} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
+    assert f"| 20 | 18 | ×/÷ {math.exp(spread):.2f} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in page_text
     text, _, rest = source_bytes("rek2024").decode().partition("sequence = ")
     sequence, _, rest = rest.partition("]")
     protocol = grouped(text + rest, "different", "delays", f"{sequence}]")
     planned = plan(protocol, felt_in(protocol))
     kinds = dict.fromkeys(planned.kinds, ())
-    told = power_markdown(Powers(plan=planned, sizes=(18,), studies=1, asked=1, seed=1, kinds=kinds))
-    _, _, _, spread, _, smallest, _ = (cell.strip(" ±") for cell in told.splitlines()[-1].split("|"))
-    one, two = np.split(np.random.default_rng(3).normal(size=(4000, 18)) * float(spread), [12], axis=1)
-    means = means_of(one + float(smallest), group=1) - means_of(two, group=2)
-    shown = np.max(p_differs(means, "two-sided"), axis=0) <= 0.05
-    assert shown.mean() == pytest.approx(0.8, abs=0.03), "all three tests must show the difference"
+    page_text = power_markdown(Powers(plan=planned, sizes=(18,), studies=1, asked=1, seed=1, kinds=kinds))
+    _, _, _, spread, _, smallest, _ = (cell.strip(" ±") for cell in page_text.splitlines()[-1].split("|"))
+    first, second = np.split(np.random.default_rng(3).normal(size=(4000, 18)) * float(spread), [12], axis=1)
+    means = means_of(first + float(smallest), group=1) - means_of(second, group=2)
+    are_significant = np.max(p_differs(means, "two-sided"), axis=0) <= 0.05
+    assert are_significant.mean() == pytest.approx(0.8, abs=0.03), "all three tests must show the difference"
 
 
 @pytest.mark.parametrize(("n", "alpha", "expected"), [(9, 0.05, None), (26, 0.02, "lower"), (40, 0.0125, "higher")])
@@ -582,7 +624,7 @@ def test_80_percent_of_studies_detect_the_smallest_difference(n: int, alpha: flo
     assert (p.t <= alpha).mean() > 0.83
 
 
-def test_power_says_whether_the_planned_participants_suffice() -> None:
+def test_power_states_whether_the_planned_participants_suffice() -> None:
     contrast = Contrast(measure="d_prime", blocks=("late", "prompt"), groups=("a", "b"))
 
     def told(planned: int, mean: float) -> str:
@@ -621,10 +663,10 @@ def test_power_says_whether_the_planned_participants_suffice() -> None:
         (["ratio"], "ratios are first divided by second", "difference, or of the mean logarithm for a ratio"),
     ],
 )
-def test_the_direction_of_each_kind_and_its_standard_error_are_told(kinds: list[str], ways: str, se: str) -> None:
-    told = _direction_words(kinds)
-    assert told.startswith(f"In the text, figures and tables, {ways}, in the order of the hypothesis;")
-    assert f"SE is the standard error of the mean {se}, and CI" in told
+def test_the_direction_of_each_kind_and_its_standard_error_are_stated(kinds: list[str], ways: str, se: str) -> None:
+    direction_words = _direction_text(kinds)
+    assert direction_words.startswith(f"In the text, figures and tables, {ways}, in the order of the hypothesis;")
+    assert f"SE is the standard error of the mean {se}, and CI" in direction_words
 
 
 @pytest.mark.parametrize(
@@ -656,7 +698,8 @@ def test_so_many_studies_without_a_difference_show_equality(groups: tuple[int, .
 
 
 D_PRIMES = [
-    (f'stimulus = "{it}", design = "2ifc", method = "m"', f'design = "2ifc", {COMPARED}') for it in ("prompt", "late")
+    (f'stimulus = "{stimulus}", design = "2ifc", method = "m"', f'design = "2ifc", {COMPARED}')
+    for stimulus in ("prompt", "late")
 ]
 
 
@@ -686,23 +729,25 @@ def test_power_plans_differences_and_equality_within_people(
     for old, new in edits:
         text = text.replace(old, new)
     errors = (0.2 if edits else math.log(1.3)) / math.sqrt(2)  # their SD is 0.2 or ln 1.3
-    found = {
+    results = {
         (block, 20): PrecisionResult([np.array([[errors], [-errors]])], [np.full(2, 0.2)])
         for block in ("late", "prompt")
     }
-    told = threshold_markdown(
+    page_text = threshold_markdown(
         Precisions(
-            protocol=parse(text.encode(), "delayed.toml"), sizes=(40,), studies=10, asked=10, seed=1, found=found
+            protocol=parse(text.encode(), "delayed.toml"), sizes=(40,), studies=10, asked=10, seed=1, found=results
         )
     )
     half, least = (spread * end for end in detectable_difference(40, alpha=0.05, expected="higher"))
     ends = f"{spread:.2f} | ±{half:.2f} | {least:.2f}"  # a one-sided test detects one direction
     if not edits:
         ends = f"×/÷ {math.exp(spread):.2f} | ×/÷ {math.exp(half):.2f} | × {math.exp(least):.2f}"
-    assert ("(a factor of 1.2), at a mean d′ of 1." if edits else "(a factor of 1.2).") in told
-    assert "Equivalence requires at least 14 participants, at α = 0.05. Participants are included if both" in told
-    assert "| smallest difference | shown to be equivalent if there is no difference |" in told
-    assert told.strip().endswith(f"| {ends} | {100 * equivalence_power(40, alpha=0.05, bound=bound / spread):.0f} % |")
+    assert ("(a factor of 1.2), at a mean d′ of 1." if edits else "(a factor of 1.2).") in page_text
+    assert "Equivalence requires at least 14 participants, at α = 0.05. Participants are included if both" in page_text
+    assert "| smallest difference | shown to be equivalent if there is no difference |" in page_text
+    assert page_text.strip().endswith(
+        f"| {ends} | {100 * equivalence_power(40, alpha=0.05, bound=bound / spread):.0f} % |"
+    )
 
 
 def test_power_counts_studies_of_statements_that_show_equality() -> None:
@@ -713,14 +758,14 @@ def test_power_counts_studies_of_statements_that_show_equality() -> None:
     protocol = parse(text.replace("[analysis]\n", f"[analysis]\n{contrast}\n").encode(), "rek2024.toml")
     planned = plan(protocol, felt_in(protocol))
     counts = count_findings(planned, (12, 24), 1, 0, 20)
-    held = [draw_opinions(planned, 24, 1, study) for study in range(20)]
+    opinions = [draw_opinions(planned, 24, 1, study) for study in range(20)]
     (at,) = (place for place, block in enumerate(planned.blocks) if block.id == "delays")
-    item = [it.id for it in planned.blocks[at].items].index("different")
-    answers = stacked_answers(held, at, (0.0,), PUBLISHED[TYPICAL])[0, :, :, :2, item]
+    item = [statement.id for statement in planned.blocks[at].items].index("different")
+    answers = stacked_answers(opinions, at, (0.0,), PUBLISHED[TYPICAL])[0, :, :, :2, item]
     away = answers[..., 1] - answers[..., 0]
-    shown = sum(tost(one, 1.0).verdict == "equivalent" for one in away - away.mean())
-    assert 0 < shown < 20
-    row = f"| *{planned.contrasts[0].described()}, if there is no difference* | 0 % | {100 * shown / 20:.0f} % ("
+    equivalent = sum(tost(sample, 1.0).verdict == "equivalent" for sample in away - away.mean())
+    assert 0 < equivalent < 20
+    row = f"| *{planned.contrasts[0].described()}, if there is no difference* | 0 % | {100 * equivalent / 20:.0f} % ("
     assert row in power_markdown(powers(planned, (12, 24), 20, 20, 1, counts))
 
 
@@ -734,8 +779,8 @@ def guessed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Results]:
     (folder / "delayed.toml").write_text(text, encoding="utf-8", newline="\n")
     study = rehearse_answers(folder / "delayed.toml", participants=3, seed=3, results=folder / "s")
     unblind(study, "AB", "to analyse")
-    made = load_study(study)
-    return made, evaluate(made)
+    loaded_study = load_study(study)
+    return loaded_study, evaluate(loaded_study)
 
 
 @pytest.mark.parametrize(
@@ -750,35 +795,35 @@ def guessed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Results]:
 def test_a_mean_d_prime_that_may_be_chance_is_a_limit(
     guessed: tuple[Study, Results], ends: tuple[tuple[float, float], ...], named: str
 ) -> None:
-    made, results = guessed
+    study, results = guessed
     (contrast,) = results.contrasts
     sides = tuple(
         replace(side, name=name, low=low, high=high)
         for side, name, (low, high) in zip(contrast.sides, ("Prompt", "Late"), ends, strict=True)
     )
-    page = limits(made, replace(results, contrasts=(replace(contrast, sides=sides),)))
+    page = limits(study, replace(results, contrasts=(replace(contrast, sides=sides),)))
     lines = [line for line in page if "(chance)" in line]
     assert lines == [
         f"Hypothesis: the interval of the mean d′ in {named} includes 0 (chance). If the participants guessed, "
         "d′ cannot show a difference."
     ] * bool(named)
-    shown = limits(made, replace(results, contrasts=(replace(contrast, sides=sides, verdict="shown"),)))
-    assert not [line for line in shown if "(chance)" in line], "it has been detected"
+    limitation_lines = limits(study, replace(results, contrasts=(replace(contrast, sides=sides, verdict="shown"),)))
+    assert not [line for line in limitation_lines if "(chance)" in line], "it has been detected"
 
 
 def test_a_single_comparison_shows_participants_as_points(guessed: tuple[Study, Results]) -> None:
-    made, results = guessed
-    captions = [picture.caption for picture in draw_figures(level_figure_tasks(made, results.levels, forms=()))]
+    study, results = guessed
+    captions = [picture.caption for picture in draw_figures(level_figure_tasks(study, results.levels, forms=()))]
     assert len(captions) == 2
     assert all("; small points show individual participants. Other panels" in caption for caption in captions)
 
 
 def test_an_order_that_is_the_same_for_all_is_a_limit_of_a_comparison_of_blocks(guessed: tuple[Study, Results]) -> None:
-    made, results = guessed
+    guessed_study, results = guessed
 
     def told(**study: str) -> list[str]:
-        protocol = {**made.protocol, "study": {**made.protocol["study"], **study}}
-        return [line for line in limits(replace(made, protocol=protocol), results) if "completed" in line]
+        protocol = {**guessed_study.protocol, "study": {**guessed_study.protocol["study"], **study}}
+        return [line for line in limits(replace(guessed_study, protocol=protocol), results) if "completed" in line]
 
     assert told() == [
         "Hypothesis: all participants completed Prompt before Late, so the difference cannot be distinguished from "
@@ -859,15 +904,15 @@ def test_the_measure_of_a_hypothesis_is_named_by_the_texts_of_its_own_block_or_f
         ],
     )
     blocks = [block("a", warm="Hot"), block("b", thick="Thick", warm="Warm"), block("c", warm="Lukewarm")]
-    study: Any = SimpleNamespace(blocks=blocks, others=others)
-    for named, name in (
+    study: Any = SimpleNamespace(blocks=blocks, others=others, levels=[])
+    for hypothesis_keys, name in (
         ({"measure": "warm", "blocks": ("b",), "conditions": ("c2", "c1")}, "agreement with “Warm”"),
         ({"measure": "warm", "blocks": ("c",), "conditions": ("c2", "c1")}, "agreement with “Lukewarm”"),
         ({"measure": "raw", "form": "load", "blocks": ("a", "b")}, "NASA-TLX raw score"),
         ({"measure": "sure", "form": "load", "blocks": ("a", "b")}, "“sure of load” (Load)"),
         ({"measure": "threshold", "blocks": ("a", "b")}, ""),
     ):
-        assert contrasts._measure_name(study, Contrast.model_validate(named)) == name
+        assert contrasts._measure_name(study, Contrast.model_validate(hypothesis_keys)) == name
 
 
 @pytest.mark.parametrize(
@@ -884,4 +929,4 @@ def test_p_before_the_adjustment_is_given_if_only_the_adjustment_makes_it_larger
     p: float | None, adjusted: float | None, verdict: str, sentence: str
 ) -> None:
     contrast: Any = SimpleNamespace(largest_p=p, p_adjusted=adjusted, verdict=verdict, members=3)
-    assert contrasts._adjustment_words(contrast) == sentence
+    assert contrasts._adjustment_text(contrast) == sentence

@@ -49,16 +49,16 @@ NOBODY = answers_from_tables(
 )
 
 
-def found(folder: Folder) -> Results:
+def evaluated(folder: Folder) -> Results:
     return evaluate(load_study(folder.folder))
 
 
 def blocks(folder: Folder) -> tuple[BlockResult, BlockResult]:
-    liquids, delays = found(folder).blocks
+    liquids, delays = evaluated(folder).blocks
     return liquids, delays
 
 
-def opened(folder: Folder, people: int) -> Folder:
+def open_study(folder: Folder, people: int) -> Folder:
     twelve(folder, people=people)
     folder.open()
     return folder
@@ -68,14 +68,14 @@ def without(table: str, folder: Path) -> Folder:
     """Return an empty study of the thesis whose protocol lacks lines of ``[analysis]``."""
     text = source_bytes("rek2024").decode()
     head, tail = text.split("\n[analysis]\n")
-    kept = (
+    analysis_table = (
         ""
         if table == "all"
         else "\n[analysis]\n" + "".join(f"{line}\n" for line in tail.splitlines() if not line.startswith(table))
     )
     if table in ("all", "names"):
         head = "\n".join(line for line in head.splitlines() if not line.startswith("label = "))
-    return make_results(folder, parse((head + kept).encode(), "rek2024.toml"))
+    return make_results(folder, parse((head + analysis_table).encode(), "rek2024.toml"))
 
 
 def test_primary_statements_are_a_holm_family_and_the_others_exploratory() -> None:
@@ -84,7 +84,7 @@ def test_primary_statements_are_a_holm_family_and_the_others_exploratory() -> No
         item: friedman([[draw.gauss(shift * place, 1) for place in range(3)] for _ in range(8)])
         for item, shift in zip("abcd", (2.0, 0.1, 1.5, 0.0), strict=True)
     }
-    tested = {one.item: one for one in corrected_tests(outcomes, NOBODY, "family")}
+    tested = {row.item: row for row in corrected_tests(outcomes, NOBODY, "family")}
     assert list(tested) == list("abcd")
     ps = {item: outcome.p for item, outcome in outcomes.items()}
     assert (tested["a"].p_adjusted, tested["b"].p_adjusted) == holm([ps["a"], ps["b"]])
@@ -94,11 +94,11 @@ def test_primary_statements_are_a_holm_family_and_the_others_exploratory() -> No
     assert [tested[item].primary for item in "abcd"] == [True, True, False, False]
 
 
-def test_what_could_not_have_been_shown_is_out_of_reach() -> None:
+def test_a_test_that_could_never_be_significant_is_out_of_reach() -> None:
     three = friedman([[1, 2, 3], [1, 2, 3], [3, 1, 2]])
     assert three.smallest_p == pytest.approx(1 / 36)
-    (one, _) = corrected_tests({"a": three, "b": three}, NOBODY, "family")
-    assert (one.verdict, one.p_adjusted) == ("out of reach", 1.0)
+    (row, _) = corrected_tests({"a": three, "b": three}, NOBODY, "family")
+    assert (row.verdict, row.p_adjusted) == ("out of reach", 1.0)
     (alone,) = corrected_tests({"a": three}, NOBODY, "family")
     assert alone.verdict == "not shown"  # one test of its own could have come to .028
     flat = friedman([[4, 4, 4]] * 5)
@@ -106,49 +106,54 @@ def test_what_could_not_have_been_shown_is_out_of_reach() -> None:
     assert (none.verdict, none.p_adjusted) == ("not tested", None)
 
 
-def test_of_five_no_pair_is_there_and_it_says_why(rek: Folder) -> None:
-    liquids, delays = blocks(opened(rek, 5))
+def test_five_participants_are_too_few_for_pairs_and_the_reason_is_stated(rek: Folder) -> None:
+    liquids, delays = blocks(open_study(rek, 5))
     assert Pairs.value_in(liquids) == ()
-    assert [one.what for one in liquids.absent] == ["pairwise comparison of conditions", "cumulative mixed model"]
+    assert [absence.what for absence in liquids.absent] == [
+        "pairwise comparison of conditions",
+        "cumulative mixed model",
+    ]
     why = "5 participants cannot show a difference between two conditions: the smallest attainable p is .062, and .188"
     assert liquids.absent[0].why.startswith(f"{why} after Holm's correction for 3 pairs, which is above 0.05")
-    assert [one.what for one in delays.absent] == [
+    assert [absence.what for absence in delays.absent] == [
         "shortest delay with a trend",
         "detection threshold",
         "cumulative mixed model",
     ]
 
 
-def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
-    results = found(opened(without("all", tmp_path / "rek2024"), 8))
+def test_without_a_decided_analysis_every_test_is_exploratory(tmp_path: Path) -> None:
+    results = evaluated(open_study(without("all", tmp_path / "rek2024"), 8))
     liquids, delays = results.blocks
     assert not results.decided.made
-    assert {one.primary for one in SettingsDiffer.value_in(liquids)} == {False}
-    assert {one.correction for one in SettingsDiffer.value_in(liquids)} == {"Benjamini-Hochberg"}
-    assert "shown" not in {one.verdict for one in SettingsDiffer.value_in(liquids)}
-    why = {one.what: one.why for one in (*liquids.absent, *delays.absent)}
+    assert {test.primary for test in SettingsDiffer.value_in(liquids)} == {False}
+    assert {test.correction for test in SettingsDiffer.value_in(liquids)} == {"Benjamini-Hochberg"}
+    assert "shown" not in {test.verdict for test in SettingsDiffer.value_in(liquids)}
+    why = {absence.what: absence.why for absence in (*liquids.absent, *delays.absent)}
     assert "be influenced by the answers" in why["equivalence test"]
-    assert "does not specify which statements name" in why["recognition test"]
-    assert {one.outcome.method.split(", ")[1] for one in DelayTrend.value_in(delays)} == {"two-sided"}
+    assert "recognition test" not in why, "the study does not ask participants to recognise liquids"
+    assert {test.outcome.method.split(", ")[1] for test in DelayTrend.value_in(delays)} == {"two-sided"}
     assert "does not specify a detection question" in why["detection threshold"]
 
 
-def test_a_bound_that_was_not_decided_is_not_made_up(tmp_path: Path) -> None:
-    _, delays = blocks(opened(without("equivalence_bound", tmp_path / "rek2024"), 8))
+def test_an_undecided_equivalence_bound_is_not_invented(tmp_path: Path) -> None:
+    _, delays = blocks(open_study(without("equivalence_bound", tmp_path / "rek2024"), 8))
     assert ContrastsWithControl.entries(delays) == {"against": (), "equivalent_up_to": {}}
     assert len(DelayTrend.value_in(delays)) == 5
 
 
 @pytest.mark.parametrize("level", [1, 4, 7])
-def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int) -> None:
+def test_identical_answers_are_not_tested(rek: Folder, level: int) -> None:
     for number in range(1, 18):
         rek.add(f"P{number:03d}", lambda _condition, _item: level)
     rek.open()
-    results = found(rek)
+    results = evaluated(rek)
     json.dumps(as_json_types(results), allow_nan=False)
     liquids, delays = results.blocks
-    assert {one.verdict for one in (*SettingsDiffer.value_in(liquids), *DelayTrend.value_in(delays))} == {"not tested"}
-    assert {one.found.verdict for one in ContrastsWithControl.value_in(delays)} == {
+    assert {test.verdict for test in (*SettingsDiffer.value_in(liquids), *DelayTrend.value_in(delays))} == {
+        "not tested"
+    }
+    assert {test.found.verdict for test in ContrastsWithControl.value_in(delays)} == {
         "equivalent"
     }  # none of seventeen moved
     assert LiquidRecognition.value_in(liquids) is not None
@@ -156,30 +161,30 @@ def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int)
 
 
 def test_trials_judged_and_valid_and_errors_of_the_delay_are_counted_by_setting_or_over_all_while_sealed() -> None:
-    """The last trial of D1 is excluded; one of its others was not judged, and one of the judged is not valid."""
-    made = study(of_delays([40, 10.5]), list(everybody(of_delays([40, 10.5]), 6, lambda *_: 4)))
-    trials = made.trials.sort_values("code", kind="stable").assign(
+    """The last trial of D1 is excluded, another one was not judged and a third is not valid."""
+    case_study = study(of_delays([40, 10.5]), list(everybody(of_delays([40, 10.5]), 6, lambda *_: 4)))
+    trials = case_study.trials.sort_values("code", kind="stable").assign(
         valid=pd.array([True, None, False, True, True, True, None, True, False, None, None, True], "boolean"),
         delay_error_mean_ms=[1.0, -4.0, None, 2.0, 3.0, 90.0, None, 0.5, 0.25, 6.0, None, 1.25],
         counted=np.arange(12) != 5,
     )
 
     def delivered(settings: tuple[Setting, ...]) -> list[tuple[object, ...]]:
-        opened = replace(made, trials=trials, blocks=(replace(made.blocks[0], settings=settings),))
-        return [astuple(row) for row in _delivery_check(opened)]
+        unblinded = replace(case_study, trials=trials, blocks=(replace(case_study.blocks[0], settings=settings),))
+        return [astuple(row) for row in _delivery_check(unblinded)]
 
     names = "block code delay_ms trials measured judged valid error_mean_ms error_worst_ms achieved_ms"
     assert [field.name for field in fields(Delivered)] == names.split()
-    assert delivered(made.blocks[0].settings) == [
+    assert delivered(case_study.blocks[0].settings) == [
         ("b", "D2", 10.5, 6, 4, 3, 2, 2.0, 6.0, 12.5), ("b", "D1", 40.0, 5, 4, 4, 3, 0.5, -4.0, 40.5),
     ]  # fmt: skip
     sealed = Setting(code="D1"), Setting(code="D2")
     assert delivered(sealed) == [("b", None, None, 11, 8, 7, 5, 1.25, 6.0, None)]
 
 
-def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder) -> None:
+def test_missing_answers_exclude_the_participant_and_never_count_as_neutral(rek: Folder) -> None:
     twelve(rek, people=8)
-    whole = {one.item: one.outcome for one in _omnibus(rek)}
+    before = {test.item: test.outcome for test in _omnibus(rek)}
 
     def missing(condition: str, item: str) -> Answer:
         return None if (condition, item) == ("honey", "immersive") else 4
@@ -187,18 +192,18 @@ def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder)
     rek.add("P100", missing)
     rek.open()
     liquids, _ = blocks(rek)
-    one = next(one for one in SettingsDiffer.value_in(liquids) if one.item == "immersive")
-    assert (one.outcome.n, one.outcome.dropped) == (8, 1)
-    assert one.outcome.p == pytest.approx(whole["immersive"].p)
+    immersive = next(test for test in SettingsDiffer.value_in(liquids) if test.item == "immersive")
+    assert (immersive.outcome.n, immersive.outcome.dropped) == (8, 1)
+    assert immersive.outcome.p == pytest.approx(before["immersive"].p)
     assert next(row for row in liquids.measures if row["item"] == "immersive" and row["missing"])["n"] == 8
 
 
 def _omnibus(folder: Folder) -> tuple:  # type: ignore[type-arg]
-    return SettingsDiffer.value_in(found(folder).blocks[0])
+    return SettingsDiffer.value_in(evaluated(folder).blocks[0])
 
 
 @pytest.mark.parametrize("n", [12, 24])
-def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> None:
+def test_liquids_that_do_not_differ_are_rarely_distinguished(n: int) -> None:
     """Honey differs in all nine statements; water and light oil are answered alike."""
     rng = np.random.default_rng(n)
     settings = tuple(
@@ -235,15 +240,15 @@ def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> No
         values = {item.id: np.clip(np.rint(rows), 1, 7) for item, rows in zip(items, latent, strict=True)}
         people = tuple(f"P{number:03d}" for number in range(n))
         pairs, _ = pairs_of(answers_from_tables(block, decided, people, values), omnibus)
-        right += sum(one.tested.verdict == "shown" for one in pairs if "honey" in (one.first, one.second))
-        wrong += any(one.tested.verdict == "shown" for one in pairs if "honey" not in (one.first, one.second))
+        right += sum(pair.tested.verdict == "shown" for pair in pairs if "honey" in (pair.first, pair.second))
+        wrong += any(pair.tested.verdict == "shown" for pair in pairs if "honey" not in (pair.first, pair.second))
     assert right >= 100 * 9
     assert wrong <= binom.ppf(0.999, 100, 0.05)
 
 
 @pytest.mark.parametrize(("statements", "alpha"), [(5, 0.05), (40, 0.05), (9, 0.001), (100, 0.01)])
 @pytest.mark.parametrize("people", [20, MANY + 1])
-def test_draws_are_so_many_that_they_decide_nothing(statements: int, alpha: float, people: int) -> None:
+def test_the_number_of_draws_does_not_change_the_verdicts(statements: int, alpha: float, people: int) -> None:
     items = tuple(
         Item(id=f"s{number}", text=f"Statement {number}.", short=f"S{number}") for number in range(statements)
     )
@@ -260,7 +265,7 @@ def test_draws_are_so_many_that_they_decide_nothing(statements: int, alpha: floa
     rng = np.random.default_rng(3)
     values = {item.id: rng.integers(1, 8, (people, 3, 1)).astype(float) for item in items}
     names = tuple(f"P{number:04d}" for number in range(people))
-    asked = answers_from_tables(block, replace(DECIDED, alpha=alpha), names, values)
-    assert statements / (1 + asked.draws) <= alpha / 20
-    assert 1 / (1 + asked.draws_over_all) <= alpha / 20
-    assert asked.draws >= DRAWS
+    results_of_answers = answers_from_tables(block, replace(DECIDED, alpha=alpha), names, values)
+    assert statements / (1 + results_of_answers.draws) <= alpha / 20
+    assert 1 / (1 + results_of_answers.draws_over_all) <= alpha / 20
+    assert results_of_answers.draws >= DRAWS

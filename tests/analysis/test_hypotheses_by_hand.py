@@ -11,11 +11,14 @@ import pytest
 
 from study_app.analysis import contrasts
 from study_app.analysis.contrasts import answer, bound_as_tested, question, t_test_name
+from study_app.analysis.data.blocks import PlacedQuestion
+from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.thresholds import ThresholdEstimate
 from study_app.analysis.results import ContrastResult, ContrastSide, LevelsResult
 from study_app.analysis.statistics.effect_sizes import EffectSize
 from study_app.analysis.statistics.outcome import Interval
 from study_app.protocol.model import Contrast
+from study_app.protocol.questions import Context, Number, ShowIf
 from tests.analysis.made_up import DECIDED, everybody, liquids, study
 
 MADE = study(liquids(2), list(everybody(liquids(2), 4, lambda *_: 4)))
@@ -30,7 +33,7 @@ def side(name: str, mean: float | None, **values: float) -> ContrastSide:
 
 def result_of(stated: dict[str, Any], **changes: Any) -> ContrastResult:
     """Return a hypothesis that was not shown: 4.25 is higher than 3.75 by 0.5."""
-    held = {
+    fields = {
         "test": "t", "n": 12, "dropped": 0, "statistic_name": "t", "effect_name": "d", "method": "m", "no_interval": "",
         "note": "", "members": 1, "compared": ("Wax", "Oil"), "ratio": False, "verdict": "not shown", "statistic": 1.5,
         "p": 0.062, "effect": 0.5, "p_adjusted": 0.062, "p_bootstrap": 0.05, "p_skewed": 0.031, "p_equivalent": None,
@@ -38,8 +41,8 @@ def result_of(stated: dict[str, Any], **changes: Any) -> ContrastResult:
         "not_excluded": None, "left_out": {}, "measure_name": "warmth",
         "sides": (side("Wax", 4.25, P1=4.0, P2=5.0), side("Oil", 3.75, P1=4.0, P2=3.0)),
     }  # fmt: skip
-    made: Any = ContrastResult(contrast=Contrast.model_validate(stated), **{**held, **changes})
-    return made  # type: ignore[no-any-return]
+    contrast_result: Any = ContrastResult(contrast=Contrast.model_validate(stated), **{**fields, **changes})
+    return contrast_result  # type: ignore[no-any-return]
 
 
 SIZE = EffectSize(name="d_z", value=0.44, low=-0.1, high=0.9, t=1.5)
@@ -80,10 +83,10 @@ def test_a_ratio_below_1_is_lower_and_equal_values_have_a_ratio_of_1() -> None:
     ratio = {"ratio": True, "verdict": "shown", "sides": sides, "measure_name": "", "compared": ("Late", "Prompt")}
     for effect, direction in ((0.5, "lower"), (1.25, "higher")):
         text = answer(result_of(BLOCKS, effect=effect, **ratio))
-        assert text.startswith(f"Threshold was {direction} in Late than in Prompt (means")
+        assert text.startswith(f"The threshold was {direction} in Late than in Prompt (means")
         assert f"mean ratio {effect:.2f}, " in text
         assert "It was higher in Late for 7 of 12 participants and equal for 1." in text
-    assert question(result_of(BLOCKS, **ratio)) == "Threshold differs between Late and Prompt"
+    assert question(result_of(BLOCKS, **ratio)) == "The threshold differs between Late and Prompt"
 
 
 LIKELIER = " The data are {} as likely {} (JZS Bayes factor, Cauchy prior with scale 0.707)"
@@ -103,7 +106,7 @@ LIKELIER = " The data are {} as likely {} (JZS Bayes factor, Cauchy prior with s
     ],
 )
 def test_the_bayes_factor_is_that_of_the_likelier_hypothesis(factor: float | None, verdict: str, sentence: str) -> None:
-    assert contrasts._bayes_words(result_of(STATED, bayes_factor=factor, verdict=verdict)) == sentence
+    assert contrasts._bayes_text(result_of(STATED, bayes_factor=factor, verdict=verdict)) == sentence
 
 
 def test_equivalence_is_stated_with_the_share_that_is_not_excluded() -> None:
@@ -152,12 +155,12 @@ def test_a_difference_is_shown_even_if_it_is_equivalent(
     p: float | None, p_equal: float | None, bound: float | None, verdict: str, is_equal: bool | None, kept: float | None
 ) -> None:
     """Alpha is 0.04."""
-    made: Any = replace(MADE, decided=replace(DECIDED, alpha=0.04), contrasts=(1, 2, 3))  # type: ignore[arg-type]
+    case_study: Any = replace(MADE, decided=replace(DECIDED, alpha=0.04), contrasts=(1, 2, 3))  # type: ignore[arg-type]
     tested = result_of({**STATED, "bound": bound}, not_excluded=0.3)
-    judged = contrasts._add_verdict(made, tested, p, p_equal)
-    assert (judged.verdict, judged.equivalent, judged.not_excluded) == (verdict, is_equal, kept)
-    assert (judged.p_adjusted, judged.p_equivalent, judged.members) == (p, p_equal, 3)
-    exploratory = replace(made, decided=replace(made.decided, made=False))
+    tested_result = contrasts._add_verdict(case_study, tested, p, p_equal)
+    assert (tested_result.verdict, tested_result.equivalent, tested_result.not_excluded) == (verdict, is_equal, kept)
+    assert (tested_result.p_adjusted, tested_result.p_equivalent, tested_result.members) == (p, p_equal, 3)
+    exploratory = replace(case_study, decided=replace(case_study.decided, made=False))
     unplanned = contrasts._add_verdict(exploratory, tested, p, p_equal)
     assert unplanned.verdict == ("suggested" if verdict == "shown" else verdict)
 
@@ -216,11 +219,11 @@ NAN = math.nan
 
 
 def test_differences_are_those_of_participants_with_both_answers_and_the_first_missing_one_is_named() -> None:
-    given = answers_of(P000=[6.0, 2.0], P001=[NAN, 3.0], P002=[5.0, NAN], P003=[NAN, NAN])
+    answers = answers_of(P000=[6.0, 2.0], P001=[NAN, 3.0], P002=[5.0, NAN], P003=[NAN, NAN])
     stated = Contrast.model_validate(STATED)
-    samples = contrasts._collect_samples(MADE, stated, [given], ())
+    samples = contrasts._collect_samples(MADE, stated, [answers], ())
     assert [sample.value for sample in samples.samples[0]] == [4.0]
-    assert [{who: held.value for who, held in values.items()} for values in samples.sides] == [
+    assert [{who: answer.value for who, answer in values.items()} for values in samples.sides] == [
         {"P000": 6.0},
         {"P000": 2.0},
     ]
@@ -229,7 +232,7 @@ def test_differences_are_those_of_participants_with_both_answers_and_the_first_m
     assert (samples.shared, samples.cells, samples.smallest, samples.means(0.05)) == (0.0, (), 1, None)
 
 
-def test_a_condition_that_the_block_pools_with_replicates_is_compared_alone() -> None:
+def test_a_hypothesis_compares_a_replicated_condition_by_itself() -> None:
     """Conditions c1 and c2 have the same delay; P000 rated c1 twice, and P002 did not rate c3."""
     block = SimpleNamespace(
         id="b", settings=[SimpleNamespace(code=f"L{n}", condition=f"c{n}") for n in (1, 2, 3)],
@@ -246,7 +249,7 @@ def test_a_condition_that_the_block_pools_with_replicates_is_compared_alone() ->
     study: Any = SimpleNamespace(answers=lambda _block: table)
     values = {
         condition: {
-            who: held.value for who, held in contrasts._agreement_values(study, "warm", answers, condition).items()
+            who: answer.value for who, answer in contrasts._agreement_values(study, "warm", answers, condition).items()
         }
         for condition in ("c1", "c2", "c3", None)
     }
@@ -258,20 +261,22 @@ def test_a_condition_that_the_block_pools_with_replicates_is_compared_alone() ->
 
 def test_an_interaction_has_the_differences_of_each_group_and_its_values_under_each_condition() -> None:
     groups = pd.array(["old", "new", "old", "other"], "string")
-    made = replace(MADE, participants=MADE.participants.assign(group=groups))
-    given = answers_of(P000=[6.0, 2.0], P001=[1.0, 3.0], P002=[5.0, 4.0], P003=[NAN, 1.0])
+    case_study = replace(MADE, participants=MADE.participants.assign(group=groups))
+    answers = answers_of(P000=[6.0, 2.0], P001=[1.0, 3.0], P002=[5.0, 4.0], P003=[NAN, 1.0])
     crossed = Contrast.model_validate({**STATED, "groups": ("new", "old")})
-    samples = contrasts._collect_samples(made, crossed, [given], ())
-    assert [[held.value for held in sample] for sample in samples.samples] == [[-2.0], [1.0, 4.0]]
+    samples = contrasts._collect_samples(case_study, crossed, [answers], ())
+    assert [[answer.value for answer in sample] for sample in samples.samples] == [[-2.0], [1.0, 4.0]]
     assert samples.left_out == {}, "P003 is in neither group"
-    held = [{who: value.value for who, value in values.items()} for values in (*samples.sides, *samples.cells)]
-    assert held == [
+    answers_of_samples = [
+        {who: value.value for who, value in values.items()} for values in (*samples.sides, *samples.cells)
+    ]
+    assert answers_of_samples == [
         {"P001": -2.0}, {"P000": 4.0, "P002": 1.0}, {"P001": 1.0}, {"P001": 3.0}, {"P000": 6.0, "P002": 5.0},
         {"P000": 2.0, "P002": 4.0},
     ]  # fmt: skip
     between = Contrast.model_validate(BETWEEN)
-    samples = contrasts._collect_samples(made, between, [given], ())
-    assert [[held.value for held in sample] for sample in samples.samples] == [[4.0, 4.5], [2.0]]
+    samples = contrasts._collect_samples(case_study, between, [answers], ())
+    assert [[answer.value for answer in sample] for sample in samples.samples] == [[4.0, 4.5], [2.0]]
     assert samples.cells == ()
 
 
@@ -308,14 +313,23 @@ def test_the_methods_name_the_tests_and_corrections_of_all_hypotheses() -> None:
     rows = (replace(rows[0], largest=6), replace(rows[1], largest=None), rows[2])
     standards = {level: SimpleNamespace(standard=level) for level in (4, 10)}
     levels = [
-        SimpleNamespace(block=block, title=title, statistics={"thresholds": [standards[level] for level in given]})
-        for block, title, given in (
+        SimpleNamespace(
+            block=block, title=title, statistics={"thresholds": [standards[level] for level in given_levels]}
+        )
+        for block, title, given_levels in (
             ("late", "Late part", (4, 10)),
             ("prompt", "Prompt", (4,)),
             ("else", "Else", (4, 10)),
         )
     ]
-    results: Any = SimpleNamespace(contrasts=rows, levels=levels)
+    results: Any = SimpleNamespace(
+        contrasts=rows,
+        levels=levels,
+        blocks=(SimpleNamespace(id="b", presentations=(1, 3)),),
+        questions=(
+            SimpleNamespace(where="b", groups=(SimpleNamespace(code="L1", numbers={"n": 9, "participants": 4}),)),
+        ),
+    )
     lines = list(contrasts.contrast_methods(results))
     assert lines[4].startswith(
         "Each participant contributed one value to each comparison (the median of repeated answers to a statement, the "
@@ -334,6 +348,17 @@ def test_the_methods_name_the_tests_and_corrections_of_all_hypotheses() -> None:
     ):
         assert sentence in text
     assert lines[-1].endswith("with an equivalence bound of 1: P3 (asleep)).")
-    (alone, *_) = contrasts.contrast_methods(SimpleNamespace(contrasts=(paired,), levels=()))  # type: ignore[arg-type]
+    (alone, *_) = contrasts.contrast_methods(SimpleNamespace(contrasts=(paired,), levels=(), blocks=(), questions=()))  # type: ignore[arg-type]
     assert alone.startswith("The hypothesis (")
     assert list(contrasts.contrast_methods(SimpleNamespace(contrasts=()))) == []  # type: ignore[arg-type]
+
+
+def test_participants_to_whom_a_question_was_not_shown_are_told_apart() -> None:
+    rule = ShowIf.model_validate({"item": "used", "is": "yes"})
+    answers = pd.DataFrame({"participant": ["P001", "P003"]})
+    tables: Any = SimpleNamespace(people=("P001", "P002", "P003"), answers_to=lambda _: answers)
+    where: Any = SimpleNamespace(id="load")
+    context = Context({}, None, "en")
+    for show_if, hidden in ((rule, {"P002"}), (None, set())):
+        question = Number(id="hours", text="Hours?", short="Hours", show_if=show_if)
+        assert Study.hidden_from(tables, PlacedQuestion(where, question, context)) == hidden

@@ -52,8 +52,8 @@ def test_bounds_are_those_of_the_program_ld98(spending: Spending, bounds: tuple[
 
     The program is described in Control. Clin. Trials 21 (2000), 190-207.
     """
-    found = norm.isf(np.array(alpha_of_looks((5, 10, 15, 20, 25), 0.05, spending)) / 2)
-    assert found == pytest.approx(bounds, abs=3e-4)
+    computed_bounds = norm.isf(np.array(alpha_of_looks((5, 10, 15, 20, 25), 0.05, spending)) / 2)
+    assert computed_bounds == pytest.approx(bounds, abs=3e-4)
     assert alpha_of_looks((7, 12), 0.05, spending)[0] < alpha_of_looks((9, 12), 0.05, spending)[0] < 0.05
 
 
@@ -64,7 +64,7 @@ def test_the_cost_of_a_test_at_every_participant_is_that_of_simulated_studies(sp
     ends = norm.isf(np.repeat(alpha_of_looks(looks, 0.05, spending), (6, 6, 1)) / 2)
     claimed = float((np.abs(walks) >= ends).any(axis=1).mean())
     assert error_of_every_report(looks, 0.05, spending) == pytest.approx(claimed, abs=0.004)
-    made = Decided(
+    decided = Decided(
         made=True,
         changed=False,
         alpha=0.05,
@@ -78,7 +78,7 @@ def test_the_cost_of_a_test_at_every_participant_is_that_of_simulated_studies(sp
         spending=spending,
     )
     rate = f"{100 * error_of_every_report(looks, 0.05, spending):.1f} %"
-    assert f"the false-positive rate would be {rate} instead of 5 %" in made.at(13).look_words(13)
+    assert f"the false-positive rate would be {rate} instead of 5 %" in decided.at(13).look_text(13)
 
 
 @pytest.mark.parametrize(
@@ -110,48 +110,54 @@ def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
     for place, level in enumerate((first, last)):
         alone = replace(planned, decided=replace(planned.decided, looks=(), alpha=level))
         once = count_findings(alone, (6, 12), 1, 0, 10)[TYPICAL]
-        for what, found in counts.items():
+        for what, detected in counts.items():
             if what[1] != "means":
-                assert (found[place] == once[what][place]).all() if place == 0 else (found[1] >= once[what][1]).all()
-                assert (found[1] >= found[0]).all()
+                assert (
+                    (detected[place] == once[what][place]).all() if place == 0 else (detected[1] >= once[what][1]).all()
+                )
+                assert (detected[1] >= detected[0]).all()
     (contrast,) = planned.contrasts
     here = [draw_opinions(planned, 12, 1, study)[1].answers(1.0, PUBLISHED[TYPICAL])[:6] for study in range(10)]
-    names, items = [it.condition for it in planned.blocks[1].settings], [it.id for it in planned.blocks[1].items]
+    names, items = (
+        [setting.condition for setting in planned.blocks[1].settings],
+        [statement.id for statement in planned.blocks[1].items],
+    )
     late, prompt, item = names.index("delay_150"), names.index("delay_0"), items.index("different")
     differences = [answers[:, late, item] - answers[:, prompt, item] for answers in here]
-    shown = sum(
+    significant = sum(
         max(ttest_1samp(by, 0, alternative="greater").pvalue, p_for_skewness(by)) <= first for by in differences
     )
-    assert counts[contrast.described(), "contrast"][0, FULL] == shown > 0
+    assert counts[contrast.described(), "contrast"][0, FULL] == significant > 0
     text = preregistration(protocol, "0" * 64)
     assert "all tests are run when 6 and 12 participants have completed a valid session;" in text
     assert f"up to {first:.3g} and {last:.3g} are significant at these looks (O'Brien–Fleming alpha spending" in text
 
 
 @pytest.mark.slow
-def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
+def test_slopes_are_tested_if_the_study_plans_them() -> None:
     protocol = parse(LOOKED.replace("looks = [6, 12]", 'trends = "slopes"').encode(), "looked.toml")
     planned = plan(protocol, felt_in(protocol))
     counts = count_findings(planned, (10,), 1, 0, 10)[TYPICAL]["delays", "found"]
     items, x = planned.blocks[1].items, np.array(planned.blocks[1].delays_ms)[:, None] / 100
-    shown = 0
+    times_shown = 0
     for number in range(10):
-        given = draw_opinions(planned, 10, 1, number)[1].answers(1.0, PUBLISHED[TYPICAL])
+        ratings = draw_opinions(planned, 10, 1, number)[1].answers(1.0, PUBLISHED[TYPICAL])
         ps = [
-            slope_test(given[:, :, at], x, planned.decided.direction(one.id)).p or 1.0 for at, one in enumerate(items)
+            slope_test(ratings[:, :, at], x, planned.decided.direction(item.id)).p or 1.0
+            for at, item in enumerate(items)
         ]
-        shown += (holm(ps)[0] or 1.0) <= 0.05
-    assert counts[0, FULL, 0] == shown > 0
-    told = "Student's t test on the slopes from each participant's regression of answers on delays"
-    assert told in preregistration(protocol, "0" * 64)
-    assert told in power_markdown(powers(planned, (10,), 10, 10, 1, count_findings(planned, (10,), 1, 0, 10)))
+        times_shown += (holm(ps)[0] or 1.0) <= 0.05
+    assert counts[0, FULL, 0] == times_shown > 0
+    test_name = "Student's t test on the slopes from each participant's regression of answers on delays"
+    assert test_name in preregistration(protocol, "0" * 64)
+    assert test_name in power_markdown(powers(planned, (10,), 10, 10, 1, count_findings(planned, (10,), 1, 0, 10)))
     settings = delays((0, 50, 100))
-    made = study(settings, list(everybody(settings, 12, lambda person, _s, code, _i: int(code[1]) + person % 3)))
-    made = replace(made, decided=replace(made.decided, trends="slopes"))
-    (found,) = (results := evaluate(made)).blocks
-    assert {one.outcome.test for one in DelayTrend.value_in(found)} == {"t test of slopes"}
-    assert not MeanTests.value_in(found), "each statement is tested once"
-    assert f"Trends across delays were tested with {told} (one-sided" in methods(made, results)
+    case_study = study(settings, list(everybody(settings, 12, lambda person, _s, code, _i: int(code[1]) + person % 3)))
+    case_study = replace(case_study, decided=replace(case_study.decided, trends="slopes"))
+    (block_result,) = (results := evaluate(case_study)).blocks
+    assert {trend.outcome.test for trend in DelayTrend.value_in(block_result)} == {"t test of slopes"}
+    assert not MeanTests.value_in(block_result), "each statement is tested once"
+    assert f"Trends across delays were tested with {test_name} (one-sided" in methods(case_study, results)
 
 
 @pytest.mark.parametrize(
@@ -164,10 +170,12 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
         (13, "This look at 13 participants was unplanned"),
     ],
 )
-def test_the_first_page_says_which_look_it_is(n: int, said: str) -> None:
-    made = study(liquids(3), list(everybody(liquids(3), n, lambda person, _s, code, _i: 1 + int(code[1]) + person % 2)))
-    decided = replace(made.decided, made=True, changed=False, looks=(6, 12))
-    results = evaluate(replace(made, decided=decided.at(made.n)))
+def test_the_first_page_states_the_current_look(n: int, said: str) -> None:
+    case_study = study(
+        liquids(3), list(everybody(liquids(3), n, lambda person, _s, code, _i: 1 + int(code[1]) + person % 2))
+    )
+    decided = replace(case_study.decided, made=True, changed=False, looks=(6, 12))
+    results = evaluate(replace(case_study, decided=decided.at(case_study.n)))
     assert said in first_page(results, ())
     assert results.decided.binding == (n >= 6)
     assert results.decided.alpha == pytest.approx(alpha_of_looks((6, 12), 0.05, "obrien-fleming")[int(n >= 12)])

@@ -30,7 +30,7 @@ def test_a_number_has_its_decimals_but_at_most_three_digits(value: float | None,
 @pytest.mark.parametrize(
     ("value", "text"), [(0.0030512, "0.00305"), (1.25, "1.25"), (1.0, "1"), (-2.3456, "−2.35"), (43210.0, "43200")]
 )
-def test_significant_digits_have_no_zeros_at_their_end(value: float, text: str) -> None:
+def test_significant_digits_do_not_end_in_zeros(value: float, text: str) -> None:
     assert significant(value) == text
 
 

@@ -46,7 +46,7 @@ def with_rules(study: Study, *rules: dict[str, Any]) -> Study:
     return replace(study, protocol={**study.protocol, "analysis": {"exclusions": list(rules)}})
 
 
-def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
+def test_each_rule_on_answers_counts_correctly() -> None:
     study = load_study(SAMPLE.path)
     first, second, uncounted, *_ = study.people
     responses, answered = study.responses.copy(), study.answered.copy()
@@ -63,8 +63,8 @@ def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
     results = evaluate(study, recordings=False)
     assert rule_sentences(with_rules(study), results) == ()
     assert proposals(with_rules(study), results) == (), "rules that are not planned propose nothing"
-    found = proposals(with_rules(study, constant, fast), results)
-    assert [(one.participant, one.rule, one.decision) for one in found] == [
+    found_proposals = proposals(with_rules(study, constant, fast), results)
+    assert [(proposal.participant, proposal.rule, proposal.decision) for proposal in found_proposals] == [
         (first, "constant_answers", "undecided"),
         (second, "fast_answers", "undecided"),
     ]
@@ -79,15 +79,21 @@ def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
     page = "".join(conduct(with_rules(study, lenient), results))
     assert "There are no exclusions." in page
     assert "the median response time is below 0.2 s. No session met this rule." in page
-    assert found[0].why == f"100 % of the {int((own & responses['counted']).sum())} answers to statements are identical"
-    assert found[1].why == f"half of the {int((hurried & answered['counted']).sum())} answers were given within 0.30 s"
+    assert (
+        found_proposals[0].why
+        == f"100 % of the {int((own & responses['counted']).sum())} answers to statements are identical"
+    )
+    assert (
+        found_proposals[1].why
+        == f"half of the {int((hurried & answered['counted']).sum())} answers were given within 0.30 s"
+    )
 
 
 @pytest.mark.parametrize(("limit", "met"), [(54.0, True), (55.0, False)])
 def test_a_percentage_that_is_exactly_the_limit_is_permitted(limit: float, met: bool) -> None:
     """Eleven of 20 answers are 4, which is 55 %; in floating point 100 * (11 / 20) is more."""
-    given = [4] * 11 + [1, 2, 3, 5, 6, 7, 1, 2, 3]
-    trials = [("P001", 1, f"L{place % 2 + 1}", given[2 * place : 2 * place + 2]) for place in range(10)]
+    ratings = [4] * 11 + [1, 2, 3, 5, 6, 7, 1, 2, 3]
+    trials = [("P001", 1, f"L{place % 2 + 1}", ratings[2 * place : 2 * place + 2]) for place in range(10)]
     constant = {"rule": "constant_answers", "limit": limit}
     assert bool(proposals(with_rules(made_up_study(liquids(2), trials), constant), None)) == met
 
@@ -102,7 +108,7 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
         def of(question: Any) -> str | None:
             if len(question.felt) != 2:
                 return None
-            first, second = (one.force_mean_n for one in question.felt)
+            first, second = (feeling.force_mean_n for feeling in question.felt)
             return "first" if (first > second) != exchanged else "second"
 
         return of
@@ -123,25 +129,26 @@ def table_text(page: str) -> str:
 
 @pytest.mark.slow
 @needs_servo
-@pytest.mark.usefixtures("figures_of_the_page")
+@pytest.mark.usefixtures("png_figures_only")
 def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Path, tmp_path: Path) -> None:
     def thresholds(study: Study) -> list[str | None]:
-        return [one.participant for one in evaluate(study, recordings=False).levels[0].statistics["thresholds"]]
+        return [
+            estimate.participant for estimate in evaluate(study, recordings=False).levels[0].statistics["thresholds"]
+        ]
 
     study = load_study(pairs)
-    (found,) = proposals(study, evaluate(study, recordings=False))
-    assert (found.what, found.rule, found.decision) == (("P002", 1), "below_chance", "undecided")
-    assert "0 of 12" in found.why
-    assert "p < .001" in found.why, "0.5 to the power of 12"
+    (proposed,) = proposals(study, evaluate(study, recordings=False))
+    assert (proposed.what, proposed.rule, proposed.decision) == (("P002", 1), "below_chance", "undecided")
+    assert "0 of 12" in proposed.why
+    assert "p < .001" in proposed.why, "0.5 to the power of 12"
     assert thresholds(study) == [None, "P001"], "not in the mean without a decision"
     assert check_rule(study, "P002", 1, "below_chance")
     assert not check_rule(replace(study, settings={}), "P001", 1, "below_chance"), "the key is sealed"
     with pytest.raises(AnalysisError, match="the rule requires that a block has fewer correct answers than expected"):
         check_rule(study, "P001", 1, "below_chance")
     beyond = with_rules(study, {"rule": "threshold_beyond_levels"})
-    assert [check_rule(beyond, found.participant, 1, found.rule) for found in proposals(beyond, evaluate(beyond))] == [
-        True, True,
-    ]  # fmt: skip
+    proposed_beyond = proposals(beyond, evaluate(beyond))
+    assert [check_rule(beyond, proposal.participant, 1, proposal.rule) for proposal in proposed_beyond] == [True, True]
     report(pairs, tmp_path / "open")
     page = (tmp_path / "open" / "report.html").read_text("utf-8")
     assert (
@@ -149,16 +156,16 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     )
     assert "two participants" in table_text(page)
     assert "1 participant)" in table_text(page)
-    held = json.loads((tmp_path / "open" / "report.json").read_text("utf-8"))
-    assert [one["decision"] for one in held["planned_exclusions"]] == ["undecided"]
+    content = json.loads((tmp_path / "open" / "report.json").read_text("utf-8"))
+    assert [exclusion["decision"] for exclusion in content["planned_exclusions"]] == ["undecided"]
 
     keep(pairs, "P002", 1, rule="below_chance", by="AB", reason="left-handed")
     with pytest.raises(StoreError, match="has already been kept"):
         keep(pairs, "P002", 1, rule="below_chance", by="AB", reason="left-handed")
     assert keep(pairs, "P002", 1, rule="fast_answers", by="AB", reason="practised").rule_or_person == "fast_answers"
     study = load_study(pairs)
-    (found,) = proposals(study, evaluate(study, recordings=False))
-    assert (found.decision, found.by.partition(": ")[2]) == ("kept", "left-handed (decided by AB)")
+    (proposed,) = proposals(study, evaluate(study, recordings=False))
+    assert (proposed.decision, proposed.by.partition(": ")[2]) == ("kept", "left-handed (decided by AB)")
     assert thresholds(study) == [None, "P001", "P002"]
     report(pairs, tmp_path / "kept")
     assert "no decision has been made yet" not in (tmp_path / "kept" / "report.html").read_text("utf-8")
@@ -171,8 +178,10 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     study = load_study(pairs)
     planned = planned_exclusions(study, evaluate(study, recordings=False))
     assert planned is not None
-    assert [(one.decision, one.why) for one in planned.proposals] == [("excluded", "keys exchanged (decided by CD)")]
-    assert [len(one.people) for one in (planned.included, planned.left_out)] == [2, 1]
+    assert [(proposal.decision, proposal.why) for proposal in planned.proposals] == [
+        ("excluded", "keys exchanged (decided by CD)")
+    ]
+    assert [len(group.people) for group in (planned.included, planned.left_out)] == [2, 1]
 
 
 def study_with(tmp_path: Path, rules: str, name: str = "demo") -> Path:
@@ -196,9 +205,9 @@ def test_an_exclusion_under_a_rule_that_the_session_does_not_meet_is_rejected_or
         check_rule(study, "P001", 1, "fast_answer")
     with pytest.raises(AnalysisError, match=r"\(it does not plan any rules\); .* omit --rule"):
         check_rule(with_rules(study), "P001", 1, "fast_answers")
-    given = study.responses.loc[study.responses["counted"] & (study.responses["participant"] == "P002"), "response"]
-    share = percent(given.value_counts().max() / len(given))
-    why = f"{share} of its {len(given)} answers to statements are identical, and the rule requires more than 97 %"
+    responses = study.responses.loc[study.responses["counted"] & (study.responses["participant"] == "P002"), "response"]
+    share = percent(responses.value_counts().max() / len(responses))
+    why = f"{share} of its {len(responses)} answers to statements are identical, and the rule requires more than 97 %"
     with pytest.raises(AnalysisError, match=f"session 1 does not meet the rule constant_answers: {why}; "):
         check_rule(study, "P002", 1, "constant_answers")
     answers = study.answered[study.answered["counted"] & (study.answered["participant"] == "P003")]

@@ -27,13 +27,13 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def rows(session: SessionFolder, table: str) -> list[dict[str, str]]:
-    """Return a table's rows without what the clock on the wall says."""
+    """Return a table's rows without wall-clock times."""
     with session.table("rek2024", table).open(newline="", encoding="utf-8") as file:
         return [{name: cell for name, cell in row.items() if not name.endswith("_at")} for row in csv.DictReader(file)]
 
 
-def known(session: SessionFolder, folder: Path) -> list[dict[str, float]]:
-    """Return what was measured of each trial: forces, motion, and how often each limiter acted."""
+def measures_of_trials(session: SessionFolder, folder: Path) -> list[dict[str, float]]:
+    """Return the measures of each trial: forces, motion, and activations of each limiter."""
     measured = ("limiter_", "force_", "path_", "mean_speed", "duration_")
     return [
         {name: it for name, it in line.items() if name.startswith(measured) and it is not None}
@@ -47,21 +47,25 @@ def copy(tmp_path: Path) -> Path:
     return Path(shutil.copytree(SAMPLE.path, tmp_path / "copy"))
 
 
-def test_it_is_sound_and_its_orders_are_made_again() -> None:
-    found = verify_study(SAMPLE.path)
-    assert (found.errors, found.warnings) == ((), ()), MAKE_AGAIN
-    assert found.sessions == 12
+def test_the_sample_is_sound_and_its_orders_are_reproduced() -> None:
+    verification = verify_study(SAMPLE.path)
+    assert (verification.errors, verification.warnings) == ((), ()), MAKE_AGAIN
+    assert verification.sessions == 12
     assert [reproduce_session(session.path).differences for session in SAMPLE.sessions()] == [[]] * 12, MAKE_AGAIN
 
 
-def test_it_is_small_sealed_simulated_and_without_recordings() -> None:
+def test_the_sample_is_small_sealed_simulated_and_without_recordings() -> None:
     there = files(SAMPLE.path)
     assert sum(map(len, there.values())) < 2_500_000
     assert "blinding/key.sealed" in there
     assert not [name for name in there if name.endswith((".parquet", "reveals.jsonl", ".tmp"))]
     for session in SAMPLE.sessions():
-        told = receipt.read(session.receipt)
-        assert (told["simulated"], told["recordings"], told["status"]) == (True, False, "completed")
+        session_receipt = receipt.read(session.receipt)
+        assert (session_receipt["simulated"], session_receipt["recordings"], session_receipt["status"]) == (
+            True,
+            False,
+            "completed",
+        )
         assert {row["simulated"] for row in rows(session, "responses")} == {"true"}
 
 
@@ -70,6 +74,8 @@ def test_its_answers_and_forces_are_those_of_a_rehearsal_today(rehearsal_of: Cal
     folder = rehearsal_of("rek2024")
     for sample, again in zip(SAMPLE.sessions()[:2], StudyFolder(folder).sessions(), strict=True):
         assert rows(sample, "responses") == rows(again, "responses"), MAKE_AGAIN
-        for kept, made in zip(known(sample, SAMPLE.path), known(again, folder), strict=True):
-            assert len(made) > 10
-            assert kept == pytest.approx(made, rel=1e-3), MAKE_AGAIN
+        for stored, rehearsed in zip(
+            measures_of_trials(sample, SAMPLE.path), measures_of_trials(again, folder), strict=True
+        ):
+            assert len(rehearsed) > 10
+            assert stored == pytest.approx(rehearsed, rel=1e-3), MAKE_AGAIN

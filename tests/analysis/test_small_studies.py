@@ -18,8 +18,8 @@ RECORDED = (0, 12)
 
 @pytest.mark.parametrize("number", STUDIES)
 def test_the_report_of_a_random_study(number: int, tmp_path: Path, pytestconfig: pytest.Config) -> None:
-    made = replace(drawn(np.random.default_rng(number)), folder=tmp_path)
-    words = list(report_words(made))
+    random_study = replace(drawn(np.random.default_rng(number)), folder=tmp_path)
+    words = list(report_words(random_study))
     assert not [line for line in words if re.search(r"\b(nan|None|inf)\b|[{}]", line)]
     if number in RECORDED:
         compare(GOLDEN / f"random-{number}.txt", each_once(words), pytestconfig, mask=CHANGING)

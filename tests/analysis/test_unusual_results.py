@@ -41,7 +41,7 @@ def unfinished(folder: Path) -> Path:
     return results.folder
 
 
-def excluded(folder: Path) -> Path:
+def with_exclusions(folder: Path) -> Path:
     results = make_results(folder / "r", load("rek2024"), simulated=False)
     for number, changes in enumerate(({"valid": False}, {"valid": None}, {"delay_error_mean_ms": -2.25}, {}), start=1):
         results.add(f"P{number}", lambda c, i, n=number: 1 + (n + len(c + i)) % 7, changes=changes)
@@ -79,16 +79,16 @@ def adaptive_file(folder: Path) -> Path:
 
 def grouped(folder: Path) -> Path:
     (folder / "grouped.toml").write_text(STUDY + GROUPS, encoding="utf-8", newline="\n")
-    felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
-    results = rehearse_answers(folder / "grouped.toml", participants=4, seed=2, results=folder / "r", features=felt)
+    features = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
+    results = rehearse_answers(folder / "grouped.toml", participants=4, seed=2, results=folder / "r", features=features)
     unblind(results, "AB", "to analyse")
     return results
 
 
 def sites_of_statements(folder: Path) -> Path:
-    felt = made_up("rek2024")
+    features = made_up("rek2024")
     folders = {
-        site: rehearse_answers("rek2024", participants=2, seed=seed, results=folder / site, features=felt)
+        site: rehearse_answers("rek2024", participants=2, seed=seed, results=folder / site, features=features)
         for seed, site in enumerate("AB", start=1)
     }
     merge_sites(folders, folder / "pooled")
@@ -98,7 +98,7 @@ def sites_of_statements(folder: Path) -> Path:
 
 QUICK = {"one_sealed": one_sealed, "unfinished": unfinished}
 SLOW = {
-    "matching": rehearsed(matching_file, 2), "excluded": excluded, "mixed": rehearsed(mixed_file, 2),
+    "matching": rehearsed(matching_file, 2), "excluded": with_exclusions, "mixed": rehearsed(mixed_file, 2),
     "grouped": grouped, "adaptive": rehearsed(adaptive_file, 2, features=False),
     "sites_of_statements": sites_of_statements,
 }  # fmt: skip
@@ -110,8 +110,8 @@ def test_the_outputs_of_unusual_results(name: str, tmp_path: Path, pytestconfig:
     folder = (QUICK | SLOW)[name](tmp_path)
     lines = list(report_words(load_study(folder)))
     with figures_as_lines():
-        written = export(folder, tmp_path / "out", extras=EXTRAS.get(name, ["wide"]))
-    for file, path in sorted({path.name: path for path in written}.items()):
+        exported_files = export(folder, tmp_path / "out", extras=EXTRAS.get(name, ["wide"]))
+    for file, path in sorted({path.name: path for path in exported_files}.items()):
         if path.suffix == ".csv":
             (width,) = {len(row) for row in csv.reader(path.read_text(encoding="utf-8").splitlines(keepends=True))}
             assert width > 1, file

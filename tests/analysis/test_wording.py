@@ -45,20 +45,20 @@ def rising(
 
 
 def codes_of_participants() -> Study:
-    made = plain(4)
-    return replace(made, settings={}, protocol={**made.protocol, "study": {"codes": "participant"}})
+    study = plain(4)
+    return replace(study, settings={}, protocol={**study.protocol, "study": {"codes": "participant"}})
 
 
 def beyond_limits() -> Study:
-    made = plain(4)
-    gaps = [300.0, 300.0, *[1.0] * (len(made.trials) - 2)]
-    limited = {**made.protocol, "limits": {"frame_gap_ms": 250.0}}
-    return replace(made, trials=made.trials.assign(worst_frame_gap_ms=gaps), protocol=limited)
+    study = plain(4)
+    gaps = [300.0, 300.0, *[1.0] * (len(study.trials) - 2)]
+    limited = {**study.protocol, "limits": {"frame_gap_ms": 250.0}}
+    return replace(study, trials=study.trials.assign(worst_frame_gap_ms=gaps), protocol=limited)
 
 
 def versions_pooled() -> Study:
-    made = plain(4)
-    return replace(made, participants=made.participants.assign(protocol_version=["1", "1", "2", "2"]))
+    study = plain(4)
+    return replace(study, participants=study.participants.assign(protocol_version=["1", "1", "2", "2"]))
 
 
 STUDIES: dict[str, Callable[[], Study]] = {
@@ -80,12 +80,12 @@ def said_of(made: Study) -> Iterator[str]:
     assert results.failures == ()
     yield from (methods(made, results), *limits(made, results))
     yield from page_lines("".join((*conduct(made, results), *block(results.blocks[0], results, ()))))
-    (described,) = json.loads(codebook_bytes(made, {}))["blocks"]
-    yield f"answers per participant, setting and item: {described['answers_per_participant_setting_and_item']}"
+    (block_table,) = json.loads(codebook_bytes(made, {}))["blocks"]
+    yield f"answers per participant, setting and item: {block_table['answers_per_participant_setting_and_item']}"
 
 
-def test_what_is_said(pytestconfig: pytest.Config) -> None:
-    lines = (line for name, made in STUDIES.items() for line in (f"== {name}", *said_of(made())))
+def test_the_wording_of_reports_is_as_recorded(pytestconfig: pytest.Config) -> None:
+    lines = (line for name, make_study in STUDIES.items() for line in (f"== {name}", *said_of(make_study())))
     compare(GOLDEN / "wording.txt", each_once(lines), pytestconfig, mask=CHANGING)
 
 
@@ -117,8 +117,19 @@ def test_p_is_adjusted_across_the_items_of_a_family(primary: tuple[str, ...], ad
         (["calm", "stirred"], ["Honey (calm)", "Honey (stirred)"]),
     ],
 )
-def test_settings_with_one_name_are_told_apart(conditions: list[str], names: list[str]) -> None:
+def test_settings_with_the_same_name_have_distinct_names(conditions: list[str], names: list[str]) -> None:
     is_track = "/" in conditions[0]
     honey: dict[str, Any] = {} if is_track else {"liquid": "honey", "delay_ms": 0.0}
     settings = [Setting(code=f"L{place}", condition=name, **honey) for place, name in enumerate(conditions, start=1)]
     assert [setting_name(setting, settings) for setting in settings] == names
+
+
+def test_settings_have_the_names_of_their_conditions() -> None:
+    pairs = {"thin_oil": "l1", "wax": "wax", "a": "l3"}
+    settings = [
+        Setting(code=f"L{liquid}", condition=name, liquid=liquid, delay_ms=0.0) for name, liquid in pairs.items()
+    ]
+    assert [setting_name(setting, settings) for setting in settings] == ["Thin oil", "Wax", "a"]
+    late = Setting(code="L9", condition="late_wax", liquid="wax", delay_ms=80.0)
+    names = [setting_name(setting, [*settings, late]) for setting in (*settings, late)]
+    assert names == ["Thin oil, 0 ms", "Wax, 0 ms", "a, 0 ms", "Wax, 80 ms"]

@@ -53,50 +53,58 @@ def signatures() -> list[str]:
     for name in api.__all__:
         thing = getattr(api, name)
         if inspect.isclass(thing):
-            fields = [one for one in inspect.get_annotations(thing).items() if not one[0].startswith("_")]
+            fields = [
+                annotation for annotation in inspect.get_annotations(thing).items() if not annotation[0].startswith("_")
+            ]
             lines += [f"{name}.{key}: {kind}" for key, kind in fields]
-            methods = {key: one for key, one in vars(thing).items() if not key.startswith("_")}
-            shown = {key: one.fget if isinstance(one, property) else one for key, one in methods.items()}
-            lines += [f"{name}.{key}{inspect.signature(one)}" for key, one in shown.items() if callable(one)]
+            methods = {key: member for key, member in vars(thing).items() if not key.startswith("_")}
+            functions = {
+                key: member.fget if isinstance(member, property) else member for key, member in methods.items()
+            }
+            lines += [
+                f"{name}.{key}{inspect.signature(function)}"
+                for key, function in functions.items()
+                if callable(function)
+            ]
         else:
             lines.append(f"{name}{inspect.signature(thing)}")
     return lines
 
 
-def test_signatures_change_with_the_version_alone(request: pytest.FixtureRequest) -> None:
+def test_signatures_change_only_with_the_version(request: pytest.FixtureRequest) -> None:
     compare(HERE / "golden" / "signatures.txt", signatures(), request.config)
 
 
 def test_importing_loads_neither_windows_nor_numbers() -> None:
     code = (
         "import sys, time; at_s = time.process_time(); import study_app.api; print(time.process_time() < at_s + 0.3, "
-        "[one for one in ('PySide6', 'numpy', 'pandas', 'numba', 'pydantic') if one in sys.modules])"
+        "[name for name in ('PySide6', 'numpy', 'pandas', 'numba', 'pydantic') if name in sys.modules])"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "True []"
 
 
 @needs_servo
-def test_forces_are_those_of_the_servo() -> None:
+def test_forces_equal_those_of_the_servo() -> None:
     t_s = np.arange(400) / 1000
     position_m = np.column_stack([0.05 * np.sin(6 * t_s), 0 * t_s, 0 * t_s])
-    found = api.simulate_force("rek2024", "honey", (t_s, position_m))
+    forces = api.simulate_force("rek2024", "honey", (t_s, position_m))
     own = offline.simulate(load_scene("rek2024", "honey"), offline.Motion(t_s, position_m))
-    assert found.tobytes() == own.tobytes()
+    assert forces.tobytes() == own.tobytes()
     lighter = api.simulate_force("rek2024", "honey", (t_s, position_m), density_kg_m3=700.0)
-    assert lighter.fx_n == pytest.approx(found.fx_n / 2, rel=1e-9)
+    assert lighter.fx_n == pytest.approx(forces.fx_n / 2, rel=1e-9)
     assert len(api.simulate_force("rek2024", "water", "circle")) > 1000
 
 
 TRIALS = pd.DataFrame({"level": [0.05, 0.1, 0.4, 0.4], "success": [False, True, True, True]})
 
 
-def test_a_participant_who_met_the_lowest_level_alone_has_a_threshold() -> None:
-    found = api.fit(TRIALS.assign(level=0.0), levels=(0.02, 1.0), design="yesno")
-    assert np.isfinite(found.threshold).all()
+def test_a_participant_with_only_the_lowest_level_has_a_threshold() -> None:
+    fitted = api.fit(TRIALS.assign(level=0.0), levels=(0.02, 1.0), design="yesno")
+    assert np.isfinite(fitted.threshold).all()
 
 
-def opened(**options: Any) -> None:
+def open_and_fail(**options: Any) -> None:
     with api.open_force("rek2024", **options):
         pytest.fail("it was opened")
 
@@ -111,9 +119,9 @@ def opened(**options: Any) -> None:
             lambda: api.rehearse("demo", 0, seed=1),
             "people = 0 is not possible: specify a whole number from 1 to 100000",
         ),
-        (lambda: opened(force_limit_n=-50.0), "= -50 is not possible"),
-        (lambda: opened(force_limit_n=math.nan), "is not possible"),
-        (lambda: opened(force_limit_n=9.0), "at most 8 N, the limit in the file"),
+        (lambda: open_and_fail(force_limit_n=-50.0), "= -50 is not possible"),
+        (lambda: open_and_fail(force_limit_n=math.nan), "is not possible"),
+        (lambda: open_and_fail(force_limit_n=9.0), "at most 8 N, the limit in the file"),
         (lambda: api.fit(TRIALS.drop(columns="success"), levels=(0.02, 1.0)), "trials do not contain success"),
         (lambda: api.fit(TRIALS, levels=(1.0, 0.02)), "levels"),
         (lambda: api.fit(TRIALS, levels=(0.02, 1.0), design="magnitude"), "no threshold .* specify one of abx, 2ifc"),
@@ -122,7 +130,7 @@ def opened(**options: Any) -> None:
         (lambda: api.fit(TRIALS[:0], levels=(0.02, 1.0)), "at least one row is needed"),
     ],
 )
-def test_what_cannot_be_used_is_one_line(call: Any, words: str) -> None:
+def test_invalid_arguments_are_reported_in_one_line(call: Any, words: str) -> None:
     with pytest.raises(StudyError, match=words) as raised:
         call()
     assert "\n" not in str(raised.value).strip() or isinstance(raised.value, ProtocolError)
@@ -244,17 +252,17 @@ def by_resistance(question: Any) -> str | None:
     """Answer which interval resisted more, without noise; leave forms to the simulated participant."""
     if len(question.felt) < 2:
         return None
-    resisted = [one.force_mean_n / one.speed_rms_mps for one in question.felt]
+    resisted = [interval.force_mean_n / interval.speed_rms_mps for interval in question.felt]
     return "first" if resisted[0] > resisted[1] else "second"
 
 
 @pytest.mark.slow
 @needs_servo
 def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_path: Path) -> None:
-    asked: list[Any] = []
+    questions: list[Any] = []
 
     def observer(question: Any) -> str | None:
-        asked.append(question)
+        questions.append(question)
         return by_resistance(question)
 
     whole, parted = tmp_path / "whole", tmp_path / "parted"
@@ -262,7 +270,7 @@ def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_
         trials = [page.trial for page in session if getattr(page, "trial", None) is not None]
     assert session.fingerprint
     assert trials == sorted(trials)
-    assert asked
+    assert questions
     with api.open_session(short, "P001", results=parted, seed=5, answer=observer, recordings=False) as session:
         for page in session:
             if getattr(page, "trial", None) == trials[-1] // 3:
@@ -272,7 +280,7 @@ def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_
                 break
     assert not session.fingerprint
     assert verify_study(parted).errors == ()
-    assert not [one for one in verify_study(parted).warnings if "subject-P001" in one.place]
+    assert not [warning for warning in verify_study(parted).warnings if "subject-P001" in warning.place]
     with api.open_session(short, "P001", results=parted, seed=99, answer=observer, recordings=False) as session:
         session.run()
     tables = [api.read(folder)["responses"] for folder in (whole, parted)]
@@ -294,25 +302,30 @@ def test_a_participant_replaces_another(tmp_path: Path) -> None:
 @pytest.mark.slow
 @needs_servo
 def test_an_own_observer_answers_with_lists_and_numbers_of_numpy(tmp_path: Path) -> None:
-    given = {"age": np.int64(30), "used": ["falcon", "mouse"], "pleasant": np.float64(25.0), "thickness": np.int32(2)}
+    own_answers = {
+        "age": np.int64(30),
+        "used": ["falcon", "mouse"],
+        "pleasant": np.float64(25.0),
+        "thickness": np.int32(2),
+    }
     others = {"hand": "both", "since": 1.5, "feels_liquid": 4, "comment": "Fine."}
 
     def observer(question: Any) -> dict[str, Any] | None:
-        asked = {item.id for item in getattr(question.page, "items", ())}
-        return {item: value for item, value in (given | others).items() if item in asked} or None
+        item_ids = {item.id for item in getattr(question.page, "items", ())}
+        return {item: value for item, value in (own_answers | others).items() if item in item_ids} or None
 
     with api.open_session(mixed_file(tmp_path), "P001", results=tmp_path / "r", seed=2, answer=observer) as session:
         session.run()
     assert verify_study(tmp_path / "r").errors == ()
     rows = api.read(tmp_path / "r")["responses"]
     assert rows["onset_s"].notna().all()  # also of questions that an answer made visible
-    told = {item: set(rows.loc[rows["item"] == item, "response"].astype(str)) for item in given}
-    assert told == {"age": {"30"}, "used": {"falcon mouse"}, "pleasant": {"25.0"}, "thickness": {"2"}}
+    responses = {item: set(rows.loc[rows["item"] == item, "response"].astype(str)) for item in own_answers}
+    assert responses == {"age": {"30"}, "used": {"falcon mouse"}, "pleasant": {"25.0"}, "thickness": {"2"}}
 
 
 def to_twice_the_standard(question: Any) -> np.int64:
-    """Adjust until what is felt resists twice as much as the standard did."""
-    standard, now = (one.force_mean_n / one.speed_rms_mps for one in question.felt)
+    """Adjust until the resistance is twice that of the standard."""
+    standard, now = (interval.force_mean_n / interval.speed_rms_mps for interval in question.felt)
     return np.int64(0 if abs(now / standard - 2) < 0.1 else 1 if now < 2 * standard else -1)  # as numpy counts
 
 
@@ -354,7 +367,7 @@ def test_a_session_of_a_participant_is_not_completed_by_simulated_answers(short:
 @pytest.mark.slow
 @needs_servo
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("answer", "words"),
     [
         ("third", "third"),
         (True, "answer True is neither a number nor text"),
@@ -362,11 +375,11 @@ def test_a_session_of_a_participant_is_not_completed_by_simulated_answers(short:
     ],
 )
 def test_an_answer_that_is_not_permitted_ends_the_block_and_loses_nothing(
-    short: Path, tmp_path: Path, given: Any, words: str
+    short: Path, tmp_path: Path, answer: Any, words: str
 ) -> None:
     with (
         pytest.raises(SessionError, match=words),
-        api.open_session(short, "P001", results=tmp_path / "r", seed=1, answer=lambda _: given) as session,
+        api.open_session(short, "P001", results=tmp_path / "r", seed=1, answer=lambda _: answer) as session,
     ):
         session.run()
     with api.open_session(short, "P001", results=tmp_path / "r", seed=1, answer=by_resistance) as session:
@@ -400,10 +413,10 @@ def test_every_way_out_of_a_force_loop_ends_at_zero_force(device: str) -> None:
             raise ZeroDivisionError
 
     def samples(loop: api.ForceLoop, count: int) -> Any:
-        found = np.zeros((0, 3))
-        while len(found) < count:
-            found = np.vstack([found, loop.read().device_force_n])
-        return found
+        samples_read = np.zeros((0, 3))
+        while len(samples_read) < count:
+            samples_read = np.vstack([samples_read, loop.read().device_force_n])
+        return samples_read
 
     hands: list[Any] = []
     loops: list[api.ForceLoop] = []
@@ -416,7 +429,7 @@ def test_every_way_out_of_a_force_loop_ends_at_zero_force(device: str) -> None:
 
 @pytest.mark.slow
 @needs_servo
-def test_a_fit_of_own_trials_is_that_of_the_report(short: Path) -> None:
+def test_a_fit_of_own_trials_equals_that_of_the_report(short: Path) -> None:
     tables = api.simulate_study(short, 2, seed=3)
     tracks, reported = tables["tracks"], tables["thresholds"]
     levels = api.load(short).stimuli["viscosity"].levels

@@ -1,4 +1,4 @@
-"""What each function of the stable interface hands on, and what it returns; nothing is computed."""
+"""Arguments and results of each function of the stable interface; nothing is computed."""
 
 import math
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ ANSWER: Any = lambda _question: None  # noqa: E731 - an observer
 
 
 class Called:
-    """What functions were called with; each returns its value."""
+    """A recorder of the arguments of replaced functions, which return given values."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.calls: list[Any] = []
@@ -57,15 +57,15 @@ def test_a_simulated_study_is_rehearsed_unblinded_and_read(called: Called, monke
     called.replace("api.unblind")
     called.replace("api.read", {"trials": 5})
     assert api.simulate_study("demo", 3, seed=7, progress=print) == {"trials": 5}
-    (_, words, named), opened, read = called.calls
+    (_, words, named), unblinded, read = called.calls
     folder = named["results"]
     assert (words, named) == (("demo",), {"participants": 3, "seed": 7, "results": folder, "progress": print})
     assert folder.name == "results"
-    assert opened == ("unblind", (folder,), {"by": "simulate_study", "reason": "simulated"})
+    assert unblinded == ("unblind", (folder,), {"by": "simulate_study", "reason": "simulated"})
     assert read == ("read", (folder,), {})
 
 
-def test_what_could_not_be_unblinded_is_told_site_by_site(called: Called) -> None:
+def test_incomplete_unblinding_is_reported_for_each_site(called: Called) -> None:
     sites = {"A-": SimpleNamespace(left=("one", "two")), "B-": SimpleNamespace(left=("three",))}
     called.replace("store.unblinding.unblind_folder", sites)
     with pytest.raises(StudyError, match=r"^the key was opened, but not everything was written: one; two; three$"):
@@ -81,7 +81,7 @@ def test_a_report_is_written_from_one_folder_to_another(called: Called) -> None:
     assert called.calls == [("report", (Path("there"), Path("to")), {})]
 
 
-def test_tables_are_those_of_the_export_by_name(called: Called) -> None:
+def test_tables_equal_those_of_the_export(called: Called) -> None:
     called.replace("analysis.data.load_study", "loaded")
     tables = [SimpleNamespace(name=name, frame=frame) for name, frame in (("trials", 1), ("responses", 2))]
     called.replace("analysis.export.exported_tables", tables)
@@ -93,7 +93,7 @@ def test_tables_are_those_of_the_export_by_name(called: Called) -> None:
 def test_a_session_is_opened_with_every_value_or_resumed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, begun: bool
 ) -> None:
-    """A resumed session keeps what it began with; only whether the group and the replaced one agree is checked."""
+    """A resumed session keeps its start values; only group and replaced participant are checked."""
     calls: list[Any] = []
     rehearsed = SimpleNamespace(pages=lambda: iter(["first", "second"]))
 
@@ -194,15 +194,15 @@ def test_a_motion_is_a_programmed_path_a_file_or_times_and_places(called: Called
     scene = load_scenes("rek2024")["honey"]
     file = tmp_path / "motion"
     file.write_text("t_s", encoding="utf-8", newline="\n")
-    for motion, asked in (
+    for motion, expected in (
         ("circle", ("programmed_motion", ("circle",), {"rate_hz": scene.rate_hz})),
         ("spiral", ("programmed_motion", ("spiral",), {"rate_hz": scene.rate_hz})),
         ("own.csv", ("read_motion", (Path("own.csv"),), {})),
         (file, ("read_motion", (file,), {})),
     ):
         assert api.simulate_force("rek2024", "honey", motion) == "forces"
-        name = "file" if asked[0] == "read_motion" else "path"
-        assert called.calls == [asked, ("simulate", (scene, name), {})]
+        name = "file" if expected[0] == "read_motion" else "path"
+        assert called.calls == [expected, ("simulate", (scene, name), {})]
         called.calls.clear()
     api.simulate_force("rek2024", "honey", ([0.0, 0.5], [[1, 2, 3], [4, 5, 6]]), density_kg_m3=700.0)
     ((_, (changed, motion), _),) = called.calls

@@ -1,4 +1,4 @@
-"""What meets in the composition root is tested without a screen, as the windows are."""
+"""Fixtures for tests of the composition root, without a screen."""
 
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,10 @@ from study_app.app.main_controller import MainController
 
 @pytest.fixture
 def visit(qapp: Any, tmp_path: Path) -> Any:
-    made = MainController(tmp_path / "results")
-    made.window.show()
-    yield made
-    made.window.close()
-    made.end()
-    made.window.deleteLater()
+    controller = MainController(tmp_path / "results")
+    controller.window.show()
+    yield controller
+    controller.window.close()
+    controller.end()
+    controller.window.deleteLater()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

@@ -25,14 +25,14 @@ from study_app.store.sessions.recovery import check_resumable
 def window(kind):
     """Return the window of that kind that is shown, or None."""
     own = [widget for widget in QApplication.topLevelWidgets() if widget.graphicsProxyWidget() is None]
-    shown = [widget for widget in own if isinstance(widget, kind) and widget.isVisible()]
-    return shown[0] if shown else None
+    visible = [widget for widget in own if isinstance(widget, kind) and widget.isVisible()]
+    return visible[0] if visible else None
 
 
 def place_at_home():
     """Return the main window's home, or None while the window is away."""
-    shown = window(MainWindow)
-    return None if shown is None else shown.place("home")
+    main_window = window(MainWindow)
+    return None if main_window is None else main_window.place("home")
 
 
 class Person(QObject):
@@ -70,18 +70,18 @@ class Person(QObject):
             QTest.mouseClick(operator.buttons.close_session, Qt.MouseButton.LeftButton)
 
 
-def attended(study, results, person=None, **options):
+def run_attended(study, results, person=None, **options):
     """Run P001's session in its windows, attended by a person; return the exit code and what is printed."""
     person, lines = person or Person(), []
-    given = {"participant": "P001", "seed": 5, "device": "scripted", "windowed": True, "operator": "AK"}
+    defaults = {"participant": "P001", "seed": 5, "device": "scripted", "windowed": True, "operator": "AK"}
     try:
-        return app.run(str(study), **(given | {"results": results, "progress": lines.append} | options)), lines
+        return app.run(str(study), **(defaults | {"results": results, "progress": lines.append} | options)), lines
     finally:
         person.deleteLater()
 
 
 @contextmanager
-def looking(look) -> Iterator[None]:
+def poll_windows(look) -> Iterator[None]:
     """Call ``look`` every 20 ms."""
     timer = QTimer(interval=20)
     timer.timeout.connect(look)
@@ -113,7 +113,7 @@ def receipt_of(results: Path):
 
 
 class Leaver(Person):
-    """Goes through the session until its second trial, and then the program is gone: nothing more is written."""
+    """A person who attends until the second trial, when the program disappears and writes nothing more."""
 
     def __init__(self, monkeypatch):
         super().__init__()

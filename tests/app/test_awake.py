@@ -1,4 +1,4 @@
-"""Screen and computer stay awake during a session: what each system is asked, and that it is released."""
+"""Screen and computer stay awake during a session: the requests to each system, and their release."""
 
 import ctypes
 import re
@@ -60,9 +60,9 @@ class ObjectiveC:
         self.names.append(name.decode())
         return len(self.names) - 1
 
-    def _send(self, receiver: Any, selector: Any, *given: Any) -> int:
+    def _send(self, receiver: Any, selector: Any, *arguments: Any) -> int:
         message = self.names[selector.value]
-        self.sent.append((self.names[receiver.value], message, [value.value for value in given]))
+        self.sent.append((self.names[receiver.value], message, [value.value for value in arguments]))
         return self._number(f"result of {message}".encode())
 
 
@@ -80,7 +80,7 @@ def test_macos_begins_an_activity_and_ends_the_same_one(monkeypatch: pytest.Monk
         ("NSProcessInfo", "processInfo"),
         ("result of processInfo", "endActivity:"),
     ]
-    options, _ = next(given for _, message, given in double.sent if message.startswith("begin"))
+    options, _ = next(arguments for _, message, arguments in double.sent if message.startswith("begin"))
     assert options == USER_INITIATED | LATENCY_CRITICAL | SCREEN_ON
     (ended,) = double.sent[-1][2]
     assert double.names[ended] == "result of retain"

@@ -1,4 +1,4 @@
-"""Compilation in the background: a session that begins meanwhile waits for it, and shows how far it is."""
+"""Compilation in the background: a session that begins meanwhile waits and shows its progress."""
 
 import threading
 from collections.abc import Sequence
@@ -15,26 +15,26 @@ class Client:
     """A worker process that gives one answer at a time, once the one before it is in ``reported``."""
 
     def __init__(self, *answers: object, reported: Sequence[float] | None = None) -> None:
-        self.left, self.given = list(answers), list[object]()
+        self.remaining_answers, self.sent_answers = list(answers), list[object]()
         self.reported = reported
         self.closed = False
 
     def answers(self) -> list[tuple[int, object]]:
-        waits = self.reported is not None and self.given and self.given[-1] not in self.reported
-        if waits or not self.left:
+        waits = self.reported is not None and self.sent_answers and self.sent_answers[-1] not in self.reported
+        if waits or not self.remaining_answers:
             return []
-        self.given.append(self.left.pop(0))
-        return [(1, self.given[-1])]
+        self.sent_answers.append(self.remaining_answers.pop(0))
+        return [(1, self.sent_answers[-1])]
 
     def close(self) -> None:
         self.closed = True
 
 
-def begun(monkeypatch: pytest.MonkeyPatch, client: Client | None) -> Compilation:
+def start_compiling(monkeypatch: pytest.MonkeyPatch, client: Client | None) -> Compilation:
     monkeypatch.setattr(compilation, "start_compilation", lambda: client)
-    made = Compilation()
-    made.start()
-    return made
+    started = Compilation()
+    started.start()
+    return started
 
 
 @pytest.mark.parametrize("last", [None, Crashed(1)])
@@ -43,7 +43,7 @@ def test_a_session_waits_until_the_process_ends_and_sees_its_progress(
 ) -> None:
     shares: list[float] = []
     client = Client(0.25, 0.75, last, reported=shares)
-    background = begun(monkeypatch, client)
+    background = start_compiling(monkeypatch, client)
     session = threading.Thread(target=background.wait, args=(shares.append, lambda: False))
     session.start()
     qtbot.waitUntil(lambda: not session.is_alive(), timeout=10_000)
@@ -55,7 +55,7 @@ def test_a_session_waits_until_the_process_ends_and_sees_its_progress(
 
 def test_a_cancelled_session_waits_no_longer(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     client = Client()
-    background = begun(monkeypatch, client)
+    background = start_compiling(monkeypatch, client)
     background.wait(lambda _share: None, lambda: True)
     assert not client.closed
     background.close()
@@ -66,7 +66,7 @@ def test_nothing_is_waited_for_if_all_is_compiled_or_no_process_starts(
     qtbot: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     shares: list[float] = []
-    begun(monkeypatch, None).wait(shares.append, lambda: False)
+    start_compiling(monkeypatch, None).wait(shares.append, lambda: False)
 
     def refuse() -> None:
         raise OSError(11, "Resource temporarily unavailable")

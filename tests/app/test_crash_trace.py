@@ -19,7 +19,7 @@ crash_here("honey")
 
 
 @pytest.mark.slow
-def test_a_crash_leaves_the_functions_and_no_value(tmp_path: Path) -> None:
+def test_a_crash_records_functions_without_values(tmp_path: Path) -> None:
     path = tmp_path / "crash.txt"
     ended = subprocess.run([sys.executable, "-c", CRASH, str(path)], capture_output=True, check=False)
     assert ended.returncode != 0

@@ -1,4 +1,4 @@
-"""Delays as a session keeps them: to the sample in virtual time, and held for real with everything a session has."""
+"""Delays in a session: exact to the sample in virtual time, and measured in a complete real session."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import parse
 from study_app.session.trial import SETTLED_S
-from tests.app.world import begun
+from tests.app.world import begin_bridge
 from tests.compiled import needs_servo
 from tests.session.fakes import FakeJournal
 
@@ -24,14 +24,16 @@ ODD_S = (0.0, 0.0503, 0.1, 0.2)
 
 
 class Room:
-    """A session of delays in virtual time: its frames come when a test says so."""
+    """A session of delays in virtual time, whose frames a test draws."""
 
     def __init__(self, servo):
         self.servo = servo
         self.protocol = parse(held.study_of_delays(TRIAL_S), "delays.toml")
         self.frames = []
         limit_n = self.protocol.device.force_limit_n
-        self.bridge = begun(self.protocol, servo, FakeJournal([]), self.seconds, recorder=self, force_limit_n=limit_n)
+        self.bridge = begin_bridge(
+            self.protocol, servo, FakeJournal([]), self.seconds, recorder=self, force_limit_n=limit_n
+        )
 
     def seconds(self):
         return self.servo.now_ns() / 1e9
@@ -57,7 +59,7 @@ class Room:
 
     def delay_s(self, trial):
         parts = self.bridge.parts
-        (step,) = [one for one in parts.session.schedule.trials if one.number == trial]
+        (step,) = [scheduled for scheduled in parts.session.schedule.trials if scheduled.number == trial]
         return self.protocol.delay_s(parts.key[step.block][step.code])
 
 
@@ -69,22 +71,22 @@ def room(qapp, monkeypatch):
     device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.02 * np.cos(5 * t_s), 0.02 * np.cos(4 * t_s))))
     with device, Servo(device, clock=VirtualClock(), elements=2000) as servo:
         servo.advance(300)  # older than the longest delay
-        made = Room(servo)
-        yield made
-        if isValid(made.bridge):
-            made.bridge.leave_without_asking()
+        live_room = Room(servo)
+        yield live_room
+        if isValid(live_room.bridge):
+            live_room.bridge.leave_without_asking()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
-def test_what_is_drawn_is_of_the_moment_that_was_asked_for_at_every_delay(room):
-    """Frames come at uneven times; each shows the hand where it was, between two samples if need be, and says so."""
+def test_each_frame_shows_the_requested_moment_at_every_delay(room):
+    """Frames come at uneven times; each shows, and reports, the interpolated past position of the hand."""
     ticks = [17, 16, 17, 7, 6, 41]
     samples = []
     reader = room.servo.telemetry.reader()
-    seen = compared = 0
+    frame_count = compared = 0
     while not room.bridge.runner.finished:
-        room.servo.advance(ticks[seen % len(ticks)])
-        seen += 1
+        room.servo.advance(ticks[frame_count % len(ticks)])
+        frame_count += 1
         assert not room.bridge.trouble, room.bridge.trouble
         samples.append(reader.read())
         count = len(room.frames[-1][1]) if room.frames else 0
@@ -111,15 +113,15 @@ def test_what_is_drawn_is_of_the_moment_that_was_asked_for_at_every_delay(room):
 
 
 def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypatch):
-    """The whole of it, for a moment: windows, servo, store; what comes of it is what was asked for, however late."""
+    """A short complete session with windows, servo and store shows every requested delay."""
     monkeypatch.setattr(held, "DELAYS_S", (0.0, 0.2))
     monkeypatch.setattr(held, "VIRTUAL_HZ", (60.0,))
     lines = []
-    found = held.measure_delays(0.5, "gui", progress=lines.append)
+    measured = held.measure_delays(0.5, "gui", progress=lines.append)
     assert lines == ["virtual, 60 Hz, tank alone", "virtual, 60 Hz, with the operator's window"]
-    assert found.loads == ("none", "gui")
-    for load in found.loads:
-        trials = found.on("virtual, 60 Hz", load)
+    assert measured.loads == ("none", "gui")
+    for load in measured.loads:
+        trials = measured.on("virtual, 60 Hz", load)
         assert [trial.delay_s for trial in trials] == [0.0, 0.2]
         for trial in trials:
             assert trial.paced == "timed by the computer's clock"

@@ -1,4 +1,4 @@
-"""The first visit of places that take long to make: what was asked for is opened there, and a failure is said."""
+"""The first visit to pages that take long to create: the requested study is opened, and a failure is reported."""
 
 from typing import Any
 
@@ -10,29 +10,29 @@ from study_app.app.main_controller import MainController
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize("asked", ["edit", "new"])
-def test_a_study_that_was_asked_for_opens_at_the_first_visit(visit: MainController, qtbot: Any, asked: str) -> None:
+@pytest.mark.parametrize("action", ["edit", "new"])
+def test_a_requested_study_opens_at_the_first_visit(visit: MainController, qtbot: Any, action: str) -> None:
     visit.preload()
-    if asked == "new":
+    if action == "new":
         visit.begin_new_study()
     else:
         visit.open_designer("demo")
     designer = visit.designer
     assert designer is not None
     assert (visit.window.here, designer.place.isVisible()) == ("designer", True)
-    opened, new_page = designer.editing.opened, designer.place.new_page
-    if asked == "edit":
-        assert opened is not None
-        assert opened.study.document["study"]["name"] == "demo"
+    document, new_page = designer.editing.opened, designer.place.new_page
+    if action == "edit":
+        assert document is not None
+        assert document.study.document["study"]["name"] == "demo"
     else:
-        assert (opened, new_page.isVisible()) == (None, True)
+        assert (document, new_page.isVisible()) == (None, True)
         assert visit.window.focusWidget() is new_page.card.questions.title
 
 
 @pytest.mark.parametrize(
     ("name", "controller"), [("lab", "app.lab_controller.Lab"), ("designer", "designer.controller.Designer")]
 )
-def test_a_place_that_cannot_be_made_is_said_and_a_second_visit_tries_again(
+def test_a_page_that_cannot_be_created_is_reported_and_retried_at_the_next_visit(
     visit: MainController, qtbot: Any, monkeypatch: pytest.MonkeyPatch, name: str, controller: str
 ) -> None:
     tried: list[str] = []
@@ -46,7 +46,7 @@ def test_a_place_that_cannot_be_made_is_said_and_a_second_visit_tries_again(
         with pytest.raises(RuntimeError, match="a module is missing"):
             visit.window.go(name)
         assert visit.window.here == "home"
-        said = " ".join(one.text() for one in visit.window.notice.findChildren(QLabel))
+        said = " ".join(label.text() for label in visit.window.notice.findChildren(QLabel))
         assert "a module is missing" in said
         visit.window.notice.close()
         visit.window.notice = None

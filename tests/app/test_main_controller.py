@@ -1,4 +1,4 @@
-"""The main window's stay around a session: what was called off is let go of before the program ends."""
+"""The main window before and after sessions: a cancelled session is released before the program ends."""
 
 import threading
 import time
@@ -106,12 +106,12 @@ def test_a_window_that_is_closed_at_once_loads_nothing_more(
 def test_the_force_model_is_compiled_once_the_modules_are_loaded(
     visit: MainController, monkeypatch: Any, qtbot: Any
 ) -> None:
-    done: list[str] = []
-    monkeypatch.setattr(main_controller, "load_modules", lambda: done.append("loaded"))
-    monkeypatch.setattr(compilation, "start_compilation", lambda: done.append("compiles"))
+    steps: list[str] = []
+    monkeypatch.setattr(main_controller, "load_modules", lambda: steps.append("loaded"))
+    monkeypatch.setattr(compilation, "start_compilation", lambda: steps.append("compiles"))
     visit.compile_when_loaded()
     visit.preload()
-    qtbot.waitUntil(lambda: done == ["loaded", "compiles"])
+    qtbot.waitUntil(lambda: steps == ["loaded", "compiles"])
 
 
 def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(
@@ -127,21 +127,19 @@ def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(
     monkeypatch.setattr(live_session, "check_connected", missing)
     monkeypatch.setattr(visit.devices, "diagnose", examined.append)
     visit.window.place("home").session_asked.emit(replace(CHOSEN, device="falcon"))
-    for count, words in ((1, "Try again"), (2, "Diagnose …")):
+    for count, words in ((1, "Try again"), (2, "Diagnose…")):
         qtbot.waitUntil(lambda count=count: len(tried) == count and visit.live is None)
         notice = visit.window.notice
         assert notice is not None
         assert notice.said.text() == "no Falcon is connected: plug it in."
-        button = next(one for one in notice.findChildren(ActionButton) if one.text() == words)
+        button = next(candidate for candidate in notice.findChildren(ActionButton) if candidate.text() == words)
         qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
         assert not notice.isVisible()
     assert (tried, examined) == (["falcon", "falcon"], ["falcon"])
 
 
-@pytest.mark.parametrize("asked", ["session", "enter", "device", "fade in"])
-def test_what_opens_a_device_ends_a_diagnosis_that_is_under_way(
-    visit: MainController, monkeypatch: Any, asked: str
-) -> None:
+@pytest.mark.parametrize("action", ["session", "enter", "device", "fade in"])
+def test_opening_a_device_ends_a_running_diagnosis(visit: MainController, monkeypatch: Any, action: str) -> None:
     monkeypatch.setattr("study_app.app.session.live_session.LiveSession", Held)
     monkeypatch.setattr("study_app.gui.devices.view.open_diagnosis", lambda window, *_device: QDialog(window))
     monkeypatch.setattr("study_app.app.lab_controller.LabController._open_device", lambda *_device: None)
@@ -150,12 +148,12 @@ def test_what_opens_a_device_ends_a_diagnosis_that_is_under_way(
     dialog = visit.devices.dialog
     assert dialog is not None
     assert dialog.isVisible()
-    if asked == "session":
+    if action == "session":
         visit.window.place("home").session_asked.emit(CHOSEN)
-    elif asked == "enter":
+    elif action == "enter":
         visit.window.go("lab")
     else:
-        visit.window.place("lab").ask(asked, "mouse")
+        visit.window.place("lab").ask(action, "mouse")
     assert not dialog.isVisible()
     assert visit.devices.dialog is None
 
@@ -198,23 +196,23 @@ def test_keys_lead_from_every_place_to_home_and_to_a_new_study(visit: MainContro
         assert window.here == "home", name
 
 
-def test_results_show_what_was_run_last(visit: MainController, monkeypatch: Any) -> None:
-    shown: list[Path] = []
+def test_results_show_the_last_session(visit: MainController, monkeypatch: Any) -> None:
+    folders: list[Path] = []
     monkeypatch.setattr("study_app.app.session.live_session.LiveSession", Held)
-    monkeypatch.setattr(visit, "results_place", SimpleNamespace(choose_study=shown.append))
+    monkeypatch.setattr(visit, "results_place", SimpleNamespace(choose_study=folders.append))
     visit.window.place("home").session_asked.emit(CHOSEN)
-    assert (shown, visit.live) == ([CHOSEN.results], None)
+    assert (folders, visit.live) == ([CHOSEN.results], None)
 
 
-def test_a_place_that_cannot_be_made_is_told_of_once(visit: MainController, monkeypatch: Any) -> None:
+def test_a_page_that_cannot_be_created_is_reported_once(visit: MainController, monkeypatch: Any) -> None:
     monkeypatch.setattr("study_app.gui.help.view.HelpPlace", lambda: 1 // 0)
     for go in (partial(visit.window.go, "help"), visit.show_help):
         with pytest.raises(ZeroDivisionError) as raised:
             go()
         visit.show_bug(raised.value)  # as of a slot
-        shown = [notice for notice in visit.window.findChildren(QDialog) if notice.isVisible()]
-        assert [notice.windowTitle() for notice in shown] == ["“Help” could not be opened"]
-        shown[0].reject()
+        notices = [notice for notice in visit.window.findChildren(QDialog) if notice.isVisible()]
+        assert [notice.windowTitle() for notice in notices] == ["“Help” could not be opened"]
+        notices[0].reject()
 
 
 def test_a_mistake_before_the_first_window_leads_home_again(
@@ -232,7 +230,7 @@ def test_a_mistake_before_the_first_window_leads_home_again(
     assert "nobody is there" in capsys.readouterr().err
 
 
-def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: MainController, qtbot: Any) -> None:
+def test_back_leads_from_the_help_to_the_page_that_opened_it(visit: MainController, qtbot: Any) -> None:
     window = visit.window
     window.go("machine")
     window.activateWindow()

@@ -1,4 +1,4 @@
-"""What the controllers of the main window's places show and do at each signal and answer.
+"""The views and actions of the controllers of the main window's pages at each signal and answer.
 
 People change the files in ``places``; no option regenerates them.
 """
@@ -40,11 +40,11 @@ ROW = {
 
 
 class Worker:
-    """Keeps its orders and tells what it is given."""
+    """A worker that records its orders and returns given answers."""
 
-    def __init__(self, done: list[str]) -> None:
-        self.done, self.told, self.number, self.works = done, list[Any](), 0, True
-        done.append("worker starts")
+    def __init__(self, events: list[str]) -> None:
+        self.done, self.pending_answers, self.number, self.works = events, list[Any](), 0, True
+        events.append("worker starts")
 
     def order(self, order: Any) -> int:
         self.number += 1
@@ -52,8 +52,8 @@ class Worker:
         return self.number
 
     def answers(self) -> list[Any]:
-        told, self.told = self.told, []
-        return told
+        answers, self.pending_answers = self.pending_answers, []
+        return answers
 
     def stop(self) -> None:
         self.done.append("worker is stopped")
@@ -103,57 +103,57 @@ RESULTS: list[tuple[str, Any]] = [
 ]  # fmt: skip
 
 
-def exclusion(asked: tuple[Any, ...]) -> dict[str, Any]:
-    return dict(zip(("participant", "session", "trial", "by", "reason"), asked, strict=True))
+def exclusion(values: tuple[Any, ...]) -> dict[str, Any]:
+    return dict(zip(("participant", "session", "trial", "by", "reason"), values, strict=True))
 
 
 def test_results(qtbot: Any) -> None:
-    done: list[str] = []
+    events: list[str] = []
     workers: list[Worker] = []
 
     def start() -> Any:
-        workers.append(Worker(done))
+        workers.append(Worker(events))
         return workers[-1]
 
-    place = ResultsPlace(Path("results"), opener=lambda file: done.append(f"open {file}"), start_worker=start)
+    place = ResultsPlace(Path("results"), opener=lambda file: events.append(f"open {file}"), start_worker=start)
     place._listening.setInterval(10**8)
     qtbot.addWidget(place)
     asks: dict[str, Any] = {
         "entered": place.enter, "left": place.leave, "study_asked": place._choose_study,
         "remedy_asked": place._apply_remedy,
-        "leave_out_asked": lambda asked: place._order_decision("excluding data", of.LeaveOut, **exclusion(asked)),
-        "take_back_asked": lambda asked: place._order_decision(
-            "reversing the exclusion", of.TakeBack, **exclusion(asked)
+        "leave_out_asked": lambda values: place._order_decision("excluding data", of.LeaveOut, **exclusion(values)),
+        "take_back_asked": lambda values: place._order_decision(
+            "reversing the exclusion", of.TakeBack, **exclusion(values)
         ),
         "unblind_asked": lambda by, reason: place._order_decision(
             "unblinding the study", of.OpenKey, by=by, reason=reason
         ),
-        "tables_asked": lambda *asked: place._start_writing(of.WriteTables, *asked),
+        "tables_asked": lambda *values: place._start_writing(of.WriteTables, *values),
         "report_asked": lambda to, _extras: place._start_writing(of.WriteReport, to), "stop_asked": place._stop_writing,
         "open_asked": place._opener, "choose": place.choose_study, "others": place.show_results,
     }  # fmt: skip
-    place.message.connect(lambda *words: done.append(f"message {words}"))
+    place.message.connect(lambda *words: events.append(f"message {words}"))
     lines, before = [], list[str]()
-    for name, given in RESULTS:
-        done.clear()
+    for name, values in RESULTS:
+        events.clear()
         reader: Any = place.reader
         match name:
             case "answer" | "slow" | "late" | "none":
                 if name == "none":
                     place.read_studies()
-                reader.told = [(reader.number - (name == "late"), given)]
+                reader.pending_answers = [(reader.number - (name == "late"), values)]
                 place._sent_s -= 10.0 * (name == "slow")
                 place._read_answers()
             case "written":
-                workers[-1].told = [(1, given)]
+                workers[-1].pending_answers = [(1, values)]
                 place._read_answers()
             case "dead":
                 reader.works = False
             case _:
-                asks[name](*given)
+                asks[name](*values)
         after = [f"busy: {place.is_busy} {place._listening.isActive()}", *value_lines(place.view, "view")]
-        asked = f"== {name} {given}"
-        lines += [(as_on_linux(asked) if sys.platform == "win32" else asked)[:80], *done, *changed(before, after)]
+        heading = f"== {name} {values}"
+        lines += [(as_on_linux(heading) if sys.platform == "win32" else heading)[:80], *events, *changed(before, after)]
         before = after
     check_kept(KEPT / "results.txt", what_comes(lines))
 
@@ -212,13 +212,13 @@ MOUSE, FALCON = (
 def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any) -> None:
     machine = WorkstationController()
     heard: list[str] = []
-    found: list[Any] = [[MOUSE, FALCON], DeviceNotFound("no bus"), [MOUSE]]
+    outcomes: list[Any] = [[MOUSE, FALCON], DeviceNotFound("no bus"), [MOUSE]]
 
     def look() -> Any:
-        one = found.pop(0)
-        if isinstance(one, Exception):
-            raise one
-        return one
+        outcome = outcomes.pop(0)
+        if isinstance(outcome, Exception):
+            raise outcome
+        return outcome
 
     class Dialog:
         def __init__(self, _parent: Any, _theme: Any, name: str, *, options: Any, note: str) -> None:
@@ -242,12 +242,12 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any) -> None:
         ("change", {"device": "falcon:FT1"}), ("diagnose", "falcon"), ("diagnose", "mouse"), ("leave", None),
         ("look", None), ("end", None), ("look", None),
     ]  # fmt: skip
-    for name, given in steps:
+    for name, value in steps:
         heard.clear()
         if name == "change":
-            place.changed.emit(given)
+            place.changed.emit(value)
         else:
-            getattr(place, DEVICE_ACTS.get(name, name))(*([] if given is None else [given]))
+            getattr(place, DEVICE_ACTS.get(name, name))(*([] if value is None else [value]))
         if place.looking.busy:
             heard.append(f"looking {place.refresh.isEnabled()}")
             place.looking.wait()
@@ -255,9 +255,9 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any) -> None:
         after = [
             f"refresh: {place.refresh.isEnabled()}",
             *value_lines(device_named(machine.settings.device, place.shown), "preferred"),
-            *value_lines([one.word for one in place.shown], "shown"),
+            *value_lines([device.word for device in place.shown], "shown"),
         ]
-        lines += [f"== {name} {given}", *heard, *changed(before, after)]
+        lines += [f"== {name} {value}", *heard, *changed(before, after)]
         before = after
     check_kept(KEPT / "devices.txt", what_comes(lines))
 
@@ -266,7 +266,7 @@ DEVICE_ACTS = {"look": "look_for_devices", "end": "stop_looking"}
 
 
 class Live(QObject):
-    """A session that records what it is asked and ends when told to."""
+    """A session that records its calls and ends on request."""
 
     over = Signal()
     done: list[str] = []  # noqa: RUF012 - shared on purpose
@@ -333,10 +333,10 @@ def test_the_stay(visit: MainController, monkeypatch: Any) -> None:
     for name, step in STAY.items():
         Live.done.clear()
         step(visit)
-        notices = [one for one in visit.window.findChildren(QDialog) if one.isVisible()]
-        told = [f"{one.windowTitle()}: {one.findChildren(QLabel)[1].text()}" for one in notices]
-        for one in notices:
-            one.reject()
+        notices = [dialog for dialog in visit.window.findChildren(QDialog) if dialog.isVisible()]
+        notice_texts = [f"{dialog.windowTitle()}: {dialog.findChildren(QLabel)[1].text()}" for dialog in notices]
+        for dialog in notices:
+            dialog.reject()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
         page = visit.help.reader.page if visit.help is not None else ""
         after = [
@@ -345,6 +345,6 @@ def test_the_stay(visit: MainController, monkeypatch: Any) -> None:
             f"help: {page}, called off: {len(visit._called_off)}",
             f"operator: {visit.machine.settings.operator}, results: {visit.results.name}",
         ]
-        lines += [f"== {name}", *Live.done, *told, *changed(before, after)]
+        lines += [f"== {name}", *Live.done, *notice_texts, *changed(before, after)]
         before = after
     check_kept(KEPT / "stay.txt", what_comes(lines))

@@ -1,4 +1,4 @@
-"""What runs when: work beside frames, garbage in the windows' thread alone, that thread before other programs."""
+"""Scheduling: work between frames, garbage collection in the windows' thread only, and its priority."""
 
 import gc
 import os
@@ -27,7 +27,7 @@ MS = 1_000_000
 
 
 class Frame:
-    """A clock turned by hand, and works that take their time."""
+    """A manual clock, and tasks with given durations."""
 
     def __init__(self, **works_ms: tuple[int, int]) -> None:
         """Take name = (how often, how long it takes) [ms]."""
@@ -42,7 +42,7 @@ class Frame:
         self.now_ns += self.takes_ms[name] * MS
 
     def run(self, frames: int, every_ms: int, tank_ms: int = 2) -> list[float]:
-        """Let frames come, each painted for so long; return how long works ran past the next one [ms]."""
+        """Paint frames of a given duration; return how far tasks ran past the next frame [ms]."""
         past = []
         start_ns = self.now_ns
         for number in range(frames):
@@ -53,7 +53,7 @@ class Frame:
         return past
 
     def times(self, name: str) -> list[int]:
-        return [at for one, at in self.done if one == name]
+        return [at for task, at in self.done if task == name]
 
 
 def test_works_are_done_as_often_as_asked_where_there_is_room_and_else_wait_their_turn() -> None:
@@ -70,7 +70,7 @@ def test_works_are_done_as_often_as_asked_where_there_is_room_and_else_wait_thei
     assert min(len(frame.times(name)) for name in ("one", "other")) >= 18
 
 
-def test_what_never_fits_is_done_one_thing_at_a_time_and_never_more_than_its_share() -> None:
+def test_work_that_never_fits_is_done_in_single_steps_within_its_share() -> None:
     frame = Frame(slow=(30, 9))
     frame.run(400, 7)
     assert (
@@ -119,7 +119,7 @@ class Cycle:
 
 
 def allocate_elsewhere() -> list[list[int]]:
-    """Let another thread make objects enough for a collection to be due; return them."""
+    """Let another thread allocate enough objects for a collection; return them."""
     kept: list[list[int]] = []
     worker = threading.Thread(target=lambda: kept.extend([] for _ in range(20_000)))
     worker.start()
@@ -140,7 +140,7 @@ def test_the_interpreter_collects_again_afterwards_if_it_did_before(qtbot: Any, 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("automatic_collection")
-def test_no_other_thread_frees_what_belongs_to_windows_open_or_closed(qtbot: Any) -> None:
+def test_no_other_thread_frees_objects_of_windows(qtbot: Any) -> None:
     open_, closed = [], []
     with collecting_in_this_thread():
         Cycle(open_)
@@ -155,7 +155,7 @@ def test_no_other_thread_frees_what_belongs_to_windows_open_or_closed(qtbot: Any
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("automatic_collection")
-def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
+def test_frozen_objects_are_not_collected_until_unfrozen() -> None:
     freed_in: list[int] = []
     Cycle(freed_in)
     freeze_garbage()
@@ -176,7 +176,7 @@ def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
 
 
 class Collector:
-    """In place of the module of the collector: has the counts it was given, and keeps what it is asked."""
+    """A replacement of the ``gc`` module with given counts, which records its calls."""
 
     def __init__(self, counts: tuple[int, ...] = (0, 0, 0), thresholds: tuple[int, ...] = (700, 10, 10)) -> None:
         self.counts, self.thresholds, self.frozen = counts, thresholds, 0
@@ -204,9 +204,9 @@ class Collector:
 
 @pytest.fixture
 def collector(monkeypatch: pytest.MonkeyPatch) -> Iterator[Collector]:
-    made = Collector()
-    monkeypatch.setattr(timing, "gc", made)
-    yield made
+    fake_collector = Collector()
+    monkeypatch.setattr(timing, "gc", fake_collector)
+    yield fake_collector
     unfreeze_garbage()
 
 
@@ -227,7 +227,7 @@ def test_the_oldest_generation_that_is_due_is_collected(
 
 
 @pytest.mark.parametrize(
-    ("counts", "took_s", "frozen", "in_session", "asked"),
+    ("counts", "took_s", "frozen", "in_session", "expected"),
     [
         ((0, 0, 11), 0.021, 400_000, False, [2, "freeze"]),
         ((0, 0, 11), 0.021, 500_001, False, [2, "freeze", "unfreeze"]),
@@ -238,7 +238,7 @@ def test_the_oldest_generation_that_is_due_is_collected(
 )
 def test_objects_of_a_long_collection_are_frozen_unless_there_are_too_many(
     collector: Collector, monkeypatch: pytest.MonkeyPatch, counts: Any, took_s: float, frozen: int,
-    in_session: bool, asked: list[Any],
+    in_session: bool, expected: list[Any],
 ) -> None:  # fmt: skip
     now_s = iter([5.0, 5.0 + took_s])
     monkeypatch.setattr(timing, "time", SimpleNamespace(thread_time=lambda: next(now_s)))
@@ -248,7 +248,7 @@ def test_objects_of_a_long_collection_are_frozen_unless_there_are_too_many(
         assert collector.asked == [timing.YOUNG, "freeze"]
         collector.asked.clear()
     timing._collect()
-    assert collector.asked == asked
+    assert collector.asked == expected
 
 
 @pytest.mark.slow
@@ -272,26 +272,26 @@ def test_this_thread_collects_until_the_windows_are_closed(
 
 
 def test_windows_and_macos_have_levels_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[Any, int]] = []
+    levels: list[tuple[Any, int]] = []
 
     def set_priority(thread: Any, level: int) -> int:
-        asked.append((thread.value, level))
+        levels.append((thread.value, level))
         return 1
 
     current = type("Call", (), {"__call__": lambda _self: 77})()
     kernel = SimpleNamespace(GetCurrentThread=current, SetThreadPriority=set_priority)
-    made = ThreadPriority()
+    priority = ThreadPriority()
     monkeypatch.setattr(timing, "sys", SimpleNamespace(platform="win32"))
     monkeypatch.setattr(timing, "ctypes", SimpleNamespace(c_void_p=lambda value: SimpleNamespace(value=value)))
-    assert made.raise_priority() is False
+    assert priority.raise_priority() is False
     monkeypatch.setattr(timing.ctypes, "windll", SimpleNamespace(kernel32=kernel), raising=False)
-    assert made.raise_priority() is True
-    made.restore()
-    assert asked == [(77, timing.ABOVE_NORMAL), (77, timing.NORMAL)]
+    assert priority.raise_priority() is True
+    priority.restore()
+    assert levels == [(77, timing.ABOVE_NORMAL), (77, timing.NORMAL)]
     monkeypatch.setattr(timing, "sys", SimpleNamespace(platform="darwin"))
-    assert made.raise_priority() is True
-    made.restore()
-    assert len(asked) == 2
+    assert priority.raise_priority() is True
+    priority.restore()
+    assert len(levels) == 2
 
 
 def level() -> int:
@@ -303,25 +303,25 @@ def level() -> int:
 def test_the_windows_thread_goes_before_other_programs_where_that_is_granted(
     granted_by: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept, asked = level(), []
+    kept, requests = level(), []
     if kept < 0:
         pytest.skip("this thread goes before others already")
 
     def refuse(*_given: object) -> None:
         raise PermissionError
 
-    made = ThreadPriority()
+    priority = ThreadPriority()
     if granted_by == "the system":
-        if not made.raise_priority():
+        if not priority.raise_priority():
             pytest.skip("this user may not")
         assert level() == timing.NICE
     else:
         monkeypatch.setattr(os, "setpriority", refuse)
-        grant = refuse if granted_by == "nobody" else lambda *given: asked.append(given)
+        grant = refuse if granted_by == "nobody" else lambda *arguments: requests.append(arguments)
         monkeypatch.setattr(clocks, "make_high_priority", grant)
-        assert made.raise_priority() == (granted_by != "nobody")
-        assert asked == ([] if granted_by == "nobody" else [(threading.get_native_id(), timing.NICE)])
+        assert priority.raise_priority() == (granted_by != "nobody")
+        assert requests == ([] if granted_by == "nobody" else [(threading.get_native_id(), timing.NICE)])
         monkeypatch.undo()
     for _ in range(2):
-        made.restore()
+        priority.restore()
         assert level() == kept

@@ -1,4 +1,4 @@
-"""Pictures of the windows: taken of a real session, whole, and nothing of it stays behind."""
+"""Screenshots of a real session: complete, and without leftovers."""
 
 import threading
 from pathlib import Path
@@ -15,18 +15,18 @@ from tools.screenshots import screenshots, session_pictures
 @pytest.mark.slow
 @pytest.mark.nightly
 @needs_servo
-def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, monkeypatch):
+def test_screenshots_of_a_session_show_both_themes(qapp, tmp_path, monkeypatch):
     monkeypatch.setattr(session_pictures, "TRACED_MS", 500)
     monkeypatch.setattr("study_app.session.start.MEASURED_S", 0.1)
-    here, told = Path.cwd(), []
-    taken = screenshots(tmp_path, only="single-blind", progress=told.append)
-    assert [path.name for path in taken][-3:] == [
+    here, progress_lines = Path.cwd(), []
+    pictures = screenshots(tmp_path, only="single-blind", progress=progress_lines.append)
+    assert [path.name for path in pictures][-3:] == [
         "cockpit-single-blind-dark.png",
         "cockpit-single-blind-light.png",
         "participant-end.png",
     ]
-    assert told == [str(path) for path in taken]
-    dark, light = (QImage(str(path)) for path in taken[-3:-1])
+    assert progress_lines == [str(path) for path in pictures]
+    dark, light = (QImage(str(path)) for path in pictures[-3:-1])
     assert dark.size() == light.size()
     assert (dark.width(), dark.height()) == session_pictures.COCKPIT
     lightness = [image.scaled(1, 1).pixelColor(0, 0).lightness() for image in (dark, light)]
@@ -34,13 +34,13 @@ def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, 
     assert lightness[1] > 180
     assert Path.cwd() == here
     assert not [window for window in QApplication.topLevelWidgets() if window.isVisible()]
-    assert sorted(tmp_path.iterdir()) == sorted(taken)
+    assert sorted(tmp_path.iterdir()) == sorted(pictures)
 
 
 @pytest.mark.slow
 @pytest.mark.nightly
 @needs_servo
-def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch):
+def test_a_failed_screenshot_releases_the_session(qapp, tmp_path, monkeypatch):
     def fails(_held, _name):
         assert [thread for thread in threading.enumerate() if thread.name == "servo"]
         raise StudyError("no picture")

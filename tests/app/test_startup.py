@@ -66,15 +66,15 @@ beside = threading.Thread(target=live_session.load_windows)
 beside.start()
 beside.join()
 windows = {"study_app.app.session.preflight_controller", "study_app.app.session.bridge", "pyarrow.parquet"}
-objects = [one for one in gc.get_objects() if isinstance(one, QObject)]
+objects = [item for item in gc.get_objects() if isinstance(item, QObject)]
 assert application in objects
-elsewhere = [repr(one) for one in objects if one.thread() != application.thread()]
+elsewhere = [repr(item) for item in objects if item.thread() != application.thread()]
 print(json.dumps([collected, for_all, at_home, at_note, sorted(windows - set(sys.modules)), elsewhere]))
 """
 
 
 def test_home_and_the_note_before_a_session_stand_before_anything_heavy_is_loaded(tmp_path: Path) -> None:
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(tmp_path / "results")],
         env=os.environ | {"QT_QPA_PLATFORM": "offscreen", "XDG_CONFIG_HOME": str(tmp_path)},
         cwd=Path(__file__).parents[2],
@@ -82,8 +82,8 @@ def test_home_and_the_note_before_a_session_stand_before_anything_heavy_is_loade
         text=True,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
-    collected, for_all, at_home, at_note, not_loaded, elsewhere = json.loads(done.stdout.splitlines()[-1])
+    assert process.returncode == 0, process.stderr
+    collected, for_all, at_home, at_note, not_loaded, elsewhere = json.loads(process.stdout.splitlines()[-1])
     assert collected == [0, True, True], "garbage is collected before and after the import, not in it"
     assert for_all == [], "a session by command loads neither the main window nor the devices"
     for loaded in (at_home, at_note):

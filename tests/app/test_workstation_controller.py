@@ -1,4 +1,4 @@
-"""What is set for this machine: kept at once, taken back, told in the receipt."""
+"""The settings of this machine: stored at once, undone, and stated in the receipt."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -26,18 +26,16 @@ def desk(qapp):
     return WorkstationController()
 
 
-def test_settings_that_cannot_be_kept_are_told_and_count_all_the_same(desk, qtbot):
+def test_settings_that_cannot_be_saved_are_reported_but_apply(desk, qtbot):
     settings_file().parent.write_text("", encoding="utf-8", newline="\n")  # a file where the folder should be
-    with qtbot.waitSignal(desk.troubled) as told:
+    with qtbot.waitSignal(desk.troubled) as trouble:
         desk.change_settings({"theme": "dark"})
-    assert "could not be saved" in told.args[0]
+    assert "could not be saved" in trouble.args[0]
     assert desk.settings.theme == "dark"
     settings_file().parent.unlink()
 
 
-def test_the_settings_page_shows_the_stored_settings_the_workspace_and_what_undo_reverts(
-    desk, qtbot, tmp_path, monkeypatch
-):
+def test_the_settings_page_shows_stored_settings_workspace_and_undo(desk, qtbot, tmp_path, monkeypatch):
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path / "lab"))
     desk.change_settings({"theme": "dark"})
     page = desk.make_place()
@@ -56,7 +54,7 @@ def test_the_settings_page_shows_the_stored_settings_the_workspace_and_what_undo
     assert shown() == (DEFAULTS.theme, DEFAULTS.viewing_distance_mm, "Undo", False)
 
 
-def test_a_device_that_nobody_knows_is_told_and_the_mouse_stands_in(qapp):
+def test_an_unknown_device_is_reported_and_replaced_by_the_mouse(qapp):
     save_settings(MachineSettings(device="hammer", theme="dark"))
     settings, trouble = settings_here()
     assert (settings.device, settings.theme) == ("mouse", "dark")
@@ -64,7 +62,7 @@ def test_a_device_that_nobody_knows_is_told_and_the_mouse_stands_in(qapp):
     assert "\n" not in trouble
 
 
-def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(qapp):
+def test_the_receipt_states_distance_width_and_offset_of_the_participants_screen(qapp):
     screen = QGuiApplication.primaryScreen()
     offset = DisplayOffset(mean_ms=20, spread_ms=1, measured="2026-11-20", screen=screen.name())
     settings = MachineSettings(viewing_distance_mm=600, screen_width_mm=300, display_offset=offset)
@@ -78,43 +76,45 @@ def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(q
     assert "viewing_distance_mm" not in screens["operator"]
 
 
-def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path, monkeypatch):
+def test_a_folder_given_by_command_applies_to_this_run(qtbot, tmp_path, monkeypatch):
     monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")
     save_settings(MachineSettings(workspace=str(tmp_path / "set")))
-    asked = MainController(tmp_path / "asked")
-    qtbot.addWidget(asked.window)
-    assert asked.results == tmp_path / "asked"
-    asked.machine.change_settings({"workspace": str(tmp_path / "other")})
-    assert asked.results == tmp_path / "asked"
+    controller = MainController(tmp_path / "asked")
+    qtbot.addWidget(controller.window)
+    assert controller.results == tmp_path / "asked"
+    controller.machine.change_settings({"workspace": str(tmp_path / "other")})
+    assert controller.results == tmp_path / "asked"
     following = MainController()
     qtbot.addWidget(following.window)
     assert following.results == tmp_path / "other" / "results"
 
 
 @pytest.mark.slow
-def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypatch):
+def test_a_damaged_settings_file_is_reported_when_the_window_opens(qtbot, tmp_path, monkeypatch):
     monkeypatch.setattr(workstation, "load_or_default", lambda: (DEFAULTS, "the file is no JSON"))
-    made = MainController(tmp_path)
-    qtbot.addWidget(made.window)
-    made.devices.backends = lambda: [MOUSE]
-    with qtbot.waitSignal(made.devices.looked):
-        made.open()
-    assert made.window.notice.isVisible()
-    made.window.notice.go_on.click()
-    assert made.window.place("home").device.state.word == "Ready"
+    controller = MainController(tmp_path)
+    qtbot.addWidget(controller.window)
+    controller.devices.backends = lambda: [MOUSE]
+    with qtbot.waitSignal(controller.devices.looked):
+        controller.open()
+    assert controller.window.notice.isVisible()
+    controller.window.notice.go_on.click()
+    assert controller.window.place("home").device.state.word == "Ready"
 
 
 @pytest.mark.parametrize(("device", "held"), [("mouse", None), ("falcon:FT1", True), ("falcon-emulated", False)])
-def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qapp, monkeypatch, device, held):
-    asked, told = [], []
+def test_the_cockpit_examines_a_falcon_and_reports_other_devices(qapp, monkeypatch, device, held):
+    diagnoses, messages = [], []
 
     def diagnosis(_parent, _theme, name, _settings, *, held):
-        asked.append((name, held))
+        diagnoses.append((name, held))
         return SimpleNamespace(show=lambda: None)
 
     monkeypatch.setattr("study_app.gui.devices.open_diagnosis", diagnosis)
     live = LiveSession(replace(CHOSEN, device=device), LIGHT)
-    live.bridge = SimpleNamespace(operator=SimpleNamespace(theme=DARK, show_message=lambda *said: told.append(said)))
+    live.bridge = SimpleNamespace(
+        operator=SimpleNamespace(theme=DARK, show_message=lambda *said: messages.append(said))
+    )
     live.diagnose()
-    assert asked == ([] if held is None else [(device, held)])
-    assert told == ([NOT_EXAMINED] if held is None else [])
+    assert diagnoses == ([] if held is None else [(device, held)])
+    assert messages == ([NOT_EXAMINED] if held is None else [])

@@ -1,4 +1,4 @@
-"""A servo, a store and a clock that do as they are told, and the two windows of a session between them."""
+"""A controlled servo, store and clock, and the two windows of a session between them."""
 
 from types import SimpleNamespace
 
@@ -19,7 +19,7 @@ from study_app.store.session_progress.progress import Progress
 
 
 class World:
-    """Servo, store and clock of a session, with everything they were asked in ``done``."""
+    """Servo, store and clock of a session; ``done`` records their calls."""
 
     def __init__(self):
         self.done = []
@@ -78,11 +78,11 @@ class World:
         self.append(journal_events.SessionEnded(status=status, reason=reason))
 
     def events(self):
-        return [done[0] for done in self.done if isinstance(done, tuple)]
+        return [call[0] for call in self.done if isinstance(call, tuple)]
 
 
-def begun(protocol, servo, journal, clock, *, strip=None, force_limit_n=None, **parts):
-    """Return the bridge of a session that has begun in its two windows; its frames come when a test draws them."""
+def begin_bridge(protocol, servo, journal, clock, *, strip=None, force_limit_n=None, **parts):
+    """Return the bridge of a session that has begun in its two windows; a test draws its frames."""
     schedule = build_schedule(protocol, "P001", 1)
     session = Session(
         protocol=protocol,
@@ -96,7 +96,7 @@ def begun(protocol, servo, journal, clock, *, strip=None, force_limit_n=None, **
         device_icon="mouse",
         device_rows=(),
     )
-    given = {
+    parts_given = {
         "session": session,
         "key": draw_key(protocol, stream(1, "key").random),
         "language": "en",
@@ -111,14 +111,14 @@ def begun(protocol, servo, journal, clock, *, strip=None, force_limit_n=None, **
     )
     for window in (participant, operator):
         window.show()
-    bridge = SessionBridge(Parts(**(given | parts)), participant, operator)
+    bridge = SessionBridge(Parts(**(parts_given | parts)), participant, operator)
     bridge.start()
     bridge.frames.stop()
     return bridge
 
 
 def begin_trial(bridge, world):
-    """Go on to a trial, whose first frame is painted at once."""
+    """Advance to a trial and paint its first frame."""
     world.now_s += 1.0
     bridge.participant.event.emit(Continue(world.now_s))
     assert isinstance(bridge.participant.page, TaskPage)

@@ -64,7 +64,7 @@ def test_a_command_computes_in_one_thread_unless_the_user_says_otherwise(
 
 
 @pytest.mark.parametrize(("device", "warned"), [("mouse", 1), ("falcon", 0), ("", 0)])
-def test_check_warns_of_what_the_device_of_this_computer_cannot_give(
+def test_check_warns_if_the_configured_device_does_not_produce_force(
     liquid_study: Run, device: str, warned: int
 ) -> None:
     if device:
@@ -85,34 +85,34 @@ def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liqui
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo-terminal")
-def test_a_letter_that_the_console_lacks_stops_no_command(tmp_path: Path) -> None:
+def test_a_character_missing_from_the_console_encoding_does_not_stop_a_command(tmp_path: Path) -> None:
     text = source_bytes("demo").decode().replace('title = "A first look"', 'title = "Łódź"', 1)
     (tmp_path / "lodz.toml").write_text(text, encoding="utf-8", newline="\n")
-    told = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-m", "study_app", "check", "lodz.toml"],
         cwd=tmp_path,
         capture_output=True,
         check=False,
         env={**os.environ, "PYTHONIOENCODING": "cp1252"},
     )
-    assert (told.returncode, told.stderr) == (0, b"")
-    assert told.stdout.startswith("Łódź (demo, version ".encode()), "a pipe is UTF-8, also where the system's is not"
+    assert (process.returncode, process.stderr) == (0, b"")
+    assert process.stdout.startswith("Łódź (demo, version ".encode()), "a pipe is UTF-8, also where the system's is not"
     reader, terminal = os.openpty()
     command = [sys.executable, "-m", "study_app", "check", "lodz.toml"]
     subprocess.run(command, cwd=tmp_path, stdout=terminal, check=True, env={**os.environ, "PYTHONIOENCODING": "cp1252"})
     assert os.read(reader, 100).startswith(b"\\u0141\xf3d\\u017a (demo, version ")
 
 
-def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_replay_without_comparisons_does_not_claim_equality(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is printed of a replay's findings, and the exit code."""
 
     def replayed(count: int, **told: Any) -> tuple[int, str]:
         some = {"recordings": count, "seconds": count, "lasted_s": 10.0 * count, "computed_s": 0.1 * count}
         none: dict[str, Any] = {"took_s": 1.5, "differences": (), "missing": (), "uncompared": ()}
-        found = replay.Replayed(**(some | none | told))
-        monkeypatch.setattr(replay, "replay", lambda _: found)
-        done = CliRunner().invoke(commands, ["replay", "ses-01"])
-        return done.exit_code, done.output
+        replay_result = replay.Replayed(**(some | none | told))
+        monkeypatch.setattr(replay, "replay", lambda _: replay_result)
+        result = CliRunner().invoke(commands, ["replay", "ses-01"])
+        return result.exit_code, result.output
 
     nothing = "no forces could be compared, so the session has not been verified\n"
     assert replayed(0) == (3, f"no recordings were stored for this session\n{nothing}")
@@ -137,9 +137,9 @@ def test_interrupting_a_command_ends_it_with_130(liquid_study: Run, monkeypatch:
 
 
 def said(*words: str, code: int = 0) -> str:
-    done = CliRunner().invoke(commands, words)
-    assert done.exit_code == code, done.output
-    return done.output
+    result = CliRunner().invoke(commands, words)
+    assert result.exit_code == code, result.output
+    return result.output
 
 
 def test_help_lists_every_command_once_under_its_heading_with_its_whole_sentence() -> None:
@@ -158,7 +158,7 @@ def released(tmp_path: Path, liquid_study: Run) -> Path:
     return study
 
 
-def test_a_second_upgrade_reports_that_nothing_is_left(tmp_path: Path, liquid_study: Run) -> None:
+def test_a_second_upgrade_reports_nothing_to_upgrade(tmp_path: Path, liquid_study: Run) -> None:
     study = shutil.copytree(RELEASED, tmp_path / "demo")
     first, second = (liquid_study("upgrade", str(study)) for _ in range(2))
     files = [Path(line) for line in first.stdout.splitlines()]
@@ -171,16 +171,16 @@ def test_a_second_upgrade_reports_that_nothing_is_left(tmp_path: Path, liquid_st
 def test_the_help_of_a_command_lists_the_devices_that_it_accepts(
     liquid_study: Run, command: str, only_moving: bool
 ) -> None:
-    shown = " ".join(liquid_study(command, "--help").stdout.split())
-    (listed,) = re.findall(r"--device NAME (.*?); see liquid-study devices\.", shown)
-    assert ("scripted" in listed, "falcon:SERIAL" in listed) == (True, not only_moving)
+    help_text = " ".join(liquid_study(command, "--help").stdout.split())
+    (device_names,) = re.findall(r"--device NAME (.*?); see liquid-study devices\.", help_text)
+    assert ("scripted" in device_names, "falcon:SERIAL" in device_names) == (True, not only_moving)
 
 
-def test_verify_says_last_what_concerns_sharing(liquid_study: Run, released: Path) -> None:
-    described = released / "dataset_description.json"
-    description = json.loads(described.read_text(encoding="utf-8"))
+def test_verify_prints_advice_on_sharing_last(liquid_study: Run, released: Path) -> None:
+    description_file = released / "dataset_description.json"
+    description = json.loads(description_file.read_text(encoding="utf-8"))
     description["variableMeasured"][0]["description"] = "The participant, in the words of an earlier version."
-    described.write_text(json.dumps(description), encoding="utf-8", newline="\n")
+    description_file.write_text(json.dumps(description), encoding="utf-8", newline="\n")
     unfinished, shared, verdict = liquid_study("verify", str(released)).stdout.splitlines()
     assert unfinished.startswith("warning: ")
     assert shared.startswith("before sharing: dataset_description.json: ")
@@ -189,13 +189,13 @@ def test_verify_says_last_what_concerns_sharing(liquid_study: Run, released: Pat
 
 def test_names_from_elsewhere_do_not_control_the_terminal(liquid_study: Run, released: Path) -> None:
     (released / "data/sub-P001/ses-01/\u202egnp.exe").touch()
-    said = liquid_study("verify", str(released)).stdout + liquid_study("verify", "no\u202estudy").stderr
-    assert said.count("\\u202e") == 2
-    assert "\u202e" not in said
+    output = liquid_study("verify", str(released)).stdout + liquid_study("verify", "no\u202estudy").stderr
+    assert output.count("\\u202e") == 2
+    assert "\u202e" not in output
 
 
 @needs_servo
-def test_a_blinded_report_says_once_how_to_open_the_key_and_which_limits_were_broken(
+def test_a_blinded_report_states_once_how_to_unblind_and_which_limits_were_broken(
     tmp_path: Path, liquid_study: Run
 ) -> None:
     source = source_bytes("demo").decode()

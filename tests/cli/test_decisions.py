@@ -29,9 +29,9 @@ WHO = ("--by", "AK", "--reason")
 
 def run(*words: object, code: int = 0) -> tuple[list[str], list[str]]:
     """Return the lines that a command prints, and those that it writes to the error stream without its progress."""
-    done = CliRunner().invoke(commands, [str(word) for word in words])
-    assert done.exit_code == code, done.output
-    return done.stdout.splitlines(), [line for line in done.stderr.splitlines() if line.startswith("warning")]
+    result = CliRunner().invoke(commands, [str(word) for word in words])
+    assert result.exit_code == code, result.output
+    return result.stdout.splitlines(), [line for line in result.stderr.splitlines() if line.startswith("warning")]
 
 
 @pytest.fixture
@@ -114,22 +114,23 @@ def test_decisions_about_a_session_are_recorded_at_its_site(labs: Path, monkeypa
             f"{block}  A-{code}  {condition}" for code, condition in conditions.items()
         ]
     assert warnings == []
-    opened = ["warning: the key is open, so the report will state that this was decided after unblinding"]
-    assert run("exclude", pooled, *trial, *WHO, "later") == (["participant A-P002, session 1, trial 2"], opened)
-    assert run("include", pooled, *trial, *WHO, "again")[1] == opened
+    warning_lines = ["warning: the key is open, so the report will state that this was decided after unblinding"]
+    assert run("exclude", pooled, *trial, *WHO, "later") == (["participant A-P002, session 1, trial 2"], warning_lines)
+    assert run("include", pooled, *trial, *WHO, "again")[1] == warning_lines
     reveals = [json.loads(line) for line in (north / "blinding" / "reveals.jsonl").read_bytes().splitlines()]
     assert [(reveal["by"], reveal["reason"]) for reveal in reveals] == [("AK", "closed")]
 
 
-def test_unblinding_names_what_each_code_stands_for_and_what_it_left(
-    labs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_unblinding_prints_the_codes_and_the_remaining_files(labs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     codes = {"liquids": {"K": "water/oil"}, "delays": {"M": "0.3/up", "R": "/down", "T": "honey"}}
     row = Exclusion(
         participant="A-P002", session=3, trial=5, rule_or_person="catch", reason="2 of 3 wrong", excluded_at="noon"
     )
-    done = {"A-": Unblinded(codes, ("trials.csv is open",), (row,)), "C-": Unblinded({"delays": {"V": "tar"}}, (), ())}
-    monkeypatch.setattr("study_app.store.unblinding.unblind_folder", lambda *_, **__: done)
+    unblinded_sites = {
+        "A-": Unblinded(codes, ("trials.csv is open",), (row,)),
+        "C-": Unblinded({"delays": {"V": "tar"}}, (), ()),
+    }
+    monkeypatch.setattr("study_app.store.unblinding.unblind_folder", lambda *_, **__: unblinded_sites)
     assert run("unblind", labs / "A", *WHO, "closed", code=3) == (
         [
             "liquids  A-K  standard water", "delays  A-M  standard 0.3", "delays  A-R  all levels",
@@ -150,13 +151,13 @@ def test_reproducing_lists_differences_then_followed_levels(
     labs: Path, monkeypatch: pytest.MonkeyPatch, differences: list[str], closing: str, code: int
 ) -> None:
     followed = ["block b: 4 of 5 levels are consistent with the answers"]
-    done = Reproduction(differences, followed)
-    monkeypatch.setattr("study_app.store.verification.reproduce_session", lambda _session: done)
+    reproduction = Reproduction(differences, followed)
+    monkeypatch.setattr("study_app.store.verification.reproduce_session", lambda _session: reproduction)
     session = StudyFolder(labs / "A").session("P001", 1).path
     assert run("reproduce", session, code=code)[0] == [*differences, *followed, closing]
 
 
-def test_a_withdrawal_names_what_it_erased_and_what_it_left(
+def test_a_withdrawal_prints_the_erased_and_the_remaining_files(
     labs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study, person = labs / "A", ("--participant", "P001")
@@ -179,8 +180,8 @@ def test_a_withdrawal_names_what_it_erased_and_what_it_left(
     assert [line for line in again if line] == [proof, nothing, searched]
     outputs = tuple(Output(to=tmp_path / name, at=f"at {name}", files=("a.csv",)) for name in ("gone", "tables"))
     (tmp_path / "tables" / "a.csv").write_bytes(b"P001")
-    done = Withdrawn(tombstone, (study,), (), outputs, ("notes.txt still names P001",))
-    monkeypatch.setattr("study_app.store.withdrawals.withdraw", lambda *_, **__: done)
+    withdrawal = Withdrawn(tombstone, (study,), (), outputs, ("notes.txt still names P001",))
+    monkeypatch.setattr("study_app.store.withdrawals.withdraw", lambda *_, **__: withdrawal)
     assert run("withdraw", study, *person, *WHO, "asked")[1] == [
         f"warning: output created at at gone outside the workspace (it no longer exists): {tmp_path / 'gone'}",
         "warning: output created at at tables outside the workspace (delete it and create it again): "
@@ -193,13 +194,17 @@ def test_a_withdrawal_names_what_it_erased_and_what_it_left(
 def test_each_option_of_an_export_asks_for_its_own_files(
     labs: Path, monkeypatch: pytest.MonkeyPatch, asked: str
 ) -> None:
-    told: dict[str, Any] = {}
+    arguments: dict[str, Any] = {}
 
     def exported(folder: Path, to: Path, **given: Any) -> tuple[Path, ...]:
-        told.update(given, folder=folder, to=to)
+        arguments.update(given, folder=folder, to=to)
         return (to / "codebook.json",)
 
     monkeypatch.setattr("study_app.analysis.export_study.export", exported)
     lines, _ = run("export", labs / "A", "--to", labs / "out", *filter(None, [asked]))
-    assert (told["folder"], told["to"], told["extras"]) == (labs / "A", labs / "out", [*filter(None, [asked[2:]])])
+    assert (arguments["folder"], arguments["to"], arguments["extras"]) == (
+        labs / "A",
+        labs / "out",
+        [*filter(None, [asked[2:]])],
+    )
     assert "codebook.json" in "".join(lines)

@@ -48,21 +48,21 @@ def start(*words: str) -> "subprocess.Popen[str]":
 
 def finish(*words: str) -> str:
     with start(*words) as program:
-        said = program.communicate()[0]
-    assert program.returncode == 0, said
-    return said
+        output = program.communicate()[0]
+    assert program.returncode == 0, output
+    return output
 
 
-def test_without_the_analysis_libraries_sessions_stay_and_one_line_says_what_to_install(
+def test_the_demo_without_analysis_libraries_keeps_its_sessions_and_names_the_extra(
     workspace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rehearse_answers("demo", participants=2, seed=4, results=workspace / STUDY, features=made_up("demo"))
     for name in [name for name in sys.modules if name.startswith("study_app.analysis.report")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "markupsafe", None)
-    done = CliRunner().invoke(commands, ["demo", "--no-window"])
-    assert done.exit_code == 0, done.output
-    (line,) = [line for line in done.output.splitlines() if line.startswith("No report: ")]
+    result = CliRunner().invoke(commands, ["demo", "--no-window"])
+    assert result.exit_code == 0, result.output
+    (line,) = [line for line in result.output.splitlines() if line.startswith("No report: ")]
     assert "pip install 'liquid-study[analysis]'" in line
     assert not (workspace / REPORT).exists()
     assert len(rows(workspace, "responses")) == 16
@@ -78,7 +78,7 @@ def test_without_the_analysis_libraries_sessions_stay_and_one_line_says_what_to_
     ids=["offscreen", "none", "not served"],
 )
 @pytest.mark.skipif(sys.platform != "linux", reason="a display can be missing on Linux alone")
-def test_without_a_display_one_line_says_how_to_open_the_program(
+def test_the_demo_without_a_display_explains_how_to_open_the_program(
     workspace: Path, monkeypatch: pytest.MonkeyPatch, variables: dict[str, str], reason: str
 ) -> None:
     rehearse_answers("demo", participants=2, seed=4, results=workspace / STUDY, features=made_up("demo"))
@@ -87,9 +87,9 @@ def test_without_a_display_one_line_says_how_to_open_the_program(
         monkeypatch.delenv(name, raising=False)
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
-    done = CliRunner().invoke(commands, ["demo"])
-    assert done.exit_code == 0, done.output
-    last = done.output.splitlines()[-1]
+    result = CliRunner().invoke(commands, ["demo"])
+    assert result.exit_code == 0, result.output
+    last = result.output.splitlines()[-1]
     assert last.startswith("The program was not opened: ")
     assert last.endswith("open it later with: liquid-study")
     assert any(words in last for words in reason.split("|"))
@@ -98,11 +98,11 @@ def test_without_a_display_one_line_says_how_to_open_the_program(
 @needs_servo
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_the_demo_runs_valid_sessions_and_a_second_call_changes_nothing(workspace: Path) -> None:
-    said = finish("--no-window")
-    assert f"Report with figures and tables: {workspace / REPORT}" in said
-    found = verify_study(workspace / STUDY, None)
-    assert (found.is_sound, found.sessions) == (True, 2)
+def test_the_demo_runs_valid_sessions_and_a_second_call_keeps_them(workspace: Path) -> None:
+    output = finish("--no-window")
+    assert f"Report with figures and tables: {workspace / REPORT}" in output
+    verification = verify_study(workspace / STUDY, None)
+    assert (verification.is_sound, verification.sessions) == (True, 2)
     trials = rows(workspace, "trials")
     assert [(row["participant"], row["trial"], row["valid"]) for row in trials] == [
         (person, str(trial), "true") for person in ("P001", "P002") for trial in (1, 2, 3, 4)
@@ -119,7 +119,7 @@ def test_the_demo_runs_valid_sessions_and_a_second_call_changes_nothing(workspac
     assert digests(workspace) == before
 
 
-def begun(person: str) -> Callable[[Path], bool]:
+def is_answered(person: str) -> Callable[[Path], bool]:
     """Return whether a person answers: the journal has more than its first lines."""
 
     def has_answers(workspace: Path) -> bool:
@@ -140,7 +140,12 @@ def is_opened(workspace: Path) -> bool:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("moment", "sent"),
-    [(begun("P002"), SIGKILL), (begun("P001"), SIGKILL), (begun("P001"), signal.SIGINT), (is_opened, SIGKILL)],
+    [
+        (is_answered("P002"), SIGKILL),
+        (is_answered("P001"), SIGKILL),
+        (is_answered("P001"), signal.SIGINT),
+        (is_opened, SIGKILL),
+    ],
     ids=["second session killed", "first session killed", "first session interrupted", "unblinding killed"],
 )
 def test_an_interrupted_demo_is_finished_by_the_next_call(
@@ -153,8 +158,8 @@ def test_an_interrupted_demo_is_finished_by_the_next_call(
         program.communicate()
     assert program.returncode in {-sent, 130}
     finish("--no-window")
-    found = verify_study(workspace / STUDY, None)
-    assert (found.is_sound, found.sessions) == (True, 2), found.errors
+    verification = verify_study(workspace / STUDY, None)
+    assert (verification.is_sound, verification.sessions) == (True, 2), verification.errors
     confirmed = [(row["participant"], row["trial"], row["item"]) for row in rows(workspace, "responses")]
     assert len(confirmed) == len(set(confirmed)) == 16
     assert (workspace / REPORT).is_file()

@@ -32,17 +32,19 @@ ROOT = Path(__file__).parents[2]
     [((), "result\n"), (("plainly",), "counting [1]\ncounting [2]\nresult\n")],
     ids=["nothing", "lines"],
 )
-def test_where_nobody_looks_nothing_but_what_was_asked_for_is_printed(words: tuple[str, ...], out: str) -> None:
-    done = subprocess.run([sys.executable, "-c", PROGRAM, *words], capture_output=True, text=True, cwd=ROOT, check=True)
-    assert (done.stdout, done.stderr) == (out, "warning\n")
+def test_progress_is_not_printed_without_a_terminal(words: tuple[str, ...], out: str) -> None:
+    process = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *words], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert (process.stdout, process.stderr) == (out, "warning\n")
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX's")
-def test_a_terminal_shows_what_is_done_and_standard_output_stays_clean() -> None:
+def test_a_terminal_shows_progress_and_standard_output_stays_clean() -> None:
     ours, theirs = os.openpty()
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", PROGRAM],
             stdout=subprocess.PIPE,
             stderr=theirs,
@@ -51,30 +53,30 @@ def test_a_terminal_shows_what_is_done_and_standard_output_stays_clean() -> None
             check=True,
             env=os.environ | {"TERM": "xterm", "COLUMNS": "80"},
         )
-        shown = os.read(ours, 65536).decode()
+        terminal_text = os.read(ours, 65536).decode()
     finally:
         os.close(ours)
         os.close(theirs)
-    assert done.stdout == "result\n"
-    assert "counting [2]" in shown
-    assert "warning" in shown
+    assert process.stdout == "result\n"
+    assert "counting [2]" in terminal_text
+    assert "warning" in terminal_text
 
 
 def test_validation_prints_each_finished_part_and_its_progress_every_20_s(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = SimpleNamespace(now_s=0.0, perf_counter=lambda: clock.now_s)
 
     def validated(known, studies, seeds, _executor, progress, say):  # type: ignore[no-untyped-def]
-        told = (known[0][1].name, studies, seeds)
+        call = (known[0][1].name, studies, seeds)
         for clock.now_s, tell in ((1, progress), (3, progress), (5, say), (6, say), (20.9, progress), (21, progress)):
-            tell(str(told))
+            tell(str(call))
         return []
 
     monkeypatch.setattr("study_app.cli.evidence.time", clock)
     monkeypatch.setattr("study_app.evidence.thresholds.validate_known_values", validated)
     words = ["validate", "viscosityjnd", "--studies", "11", "--seed", "3", "--seed", "5", "--workers", "1"]
-    ran = CliRunner().invoke(commands, words, catch_exceptions=False)
-    assert ran.stderr.splitlines() == [f"{at_s} s: ('viscosityjnd', 11, (3, 5))" for at_s in (1, 5, 6, 21)]
-    assert ran.stdout.startswith("11 studies for each protocol and seed (3, 5), in 21 s, ")
+    result = CliRunner().invoke(commands, words, catch_exceptions=False)
+    assert result.stderr.splitlines() == [f"{at_s} s: ('viscosityjnd', 11, (3, 5))" for at_s in (1, 5, 6, 21)]
+    assert result.stdout.startswith("11 studies for each protocol and seed (3, 5), in 21 s, ")
 
 
 def test_validating_the_report_prints_the_studies_every_20_s_and_each_continued_rate(
@@ -92,13 +94,19 @@ def test_validating_the_report_prints_the_studies_every_20_s_and_each_continued_
     monkeypatch.setattr("study_app.cli.evidence.time", clock)
     monkeypatch.setattr("study_app.session.simulated.rehearsal.condition_features", lambda _, *, seed: f"felt {seed}")
     monkeypatch.setattr(
-        "study_app.analysis.planning.simulated_studies.plan", lambda of, felt: f"{of.study.name} {felt}"
+        "study_app.analysis.planning.simulated_studies.plan", lambda of, study_text: f"{of.study.name} {study_text}"
     )
     monkeypatch.setattr("study_app.evidence.report_rates.measure_report_rates", measured)
     words = ["validate-report", "--studies", "17", "--seed", "3", "--workers", "1"]
-    ran = CliRunner().invoke(commands, words, catch_exceptions=False)
+    result = CliRunner().invoke(commands, words, catch_exceptions=False)
     continued = "rek2024 felt 3, 17 studies, seed 3"
-    told = [(0, "rehearsing every condition"), (21, continued), (21, "20 studies"), (22, continued), (43, "50 studies")]
-    assert ran.stderr.splitlines() == [f"{at_s} s: {text}" for at_s, text in told]
-    assert ran.stdout.startswith("50 studies in 43 s\n")
-    assert "no rate was computed" in ran.stdout
+    messages = [
+        (0, "rehearsing every condition"),
+        (21, continued),
+        (21, "20 studies"),
+        (22, continued),
+        (43, "50 studies"),
+    ]
+    assert result.stderr.splitlines() == [f"{at_s} s: {text}" for at_s, text in messages]
+    assert result.stdout.startswith("50 studies in 43 s\n")
+    assert "no rate was computed" in result.stdout

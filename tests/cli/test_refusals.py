@@ -16,7 +16,7 @@ from study_app.protocol.load import load_scenes
 
 
 class Visit:
-    """What the study designer is asked for."""
+    """The requests to the study designer."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, ...]] = []
@@ -41,7 +41,7 @@ def visit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Visit:
     return made
 
 
-def test_new_begins_a_study_in_the_designer_and_writes_nothing(visit: Visit, tmp_path: Path) -> None:
+def test_new_opens_the_designer_without_writing_a_file(visit: Visit, tmp_path: Path) -> None:
     assert CliRunner().invoke(commands, ["new", "mine", "--template", "rate-realism"]).exit_code == 0
     assert visit.asked == [("begin", "template:rate-realism", "mine")]
     assert not (tmp_path / "protocols").exists()
@@ -63,10 +63,10 @@ def test_edit_opens_a_study_by_name_or_file(visit: Visit, tmp_path: Path) -> Non
         (("new", "rek2024"), "rek2024"),
     ],
 )
-def test_what_cannot_be_is_refused_before_a_window_opens(visit: Visit, words: tuple[str, ...], said: str) -> None:
-    refused = CliRunner().invoke(commands, words).exception
-    assert isinstance(refused, StudyError)
-    assert said in str(refused)
+def test_impossible_commands_are_refused_before_a_window_opens(visit: Visit, words: tuple[str, ...], said: str) -> None:
+    result = CliRunner().invoke(commands, words).exception
+    assert isinstance(result, StudyError)
+    assert said in str(result)
     assert visit.asked == []
 
 
@@ -74,9 +74,9 @@ def test_a_survey_of_liquids_is_written_into_a_folder(monkeypatch: pytest.Monkey
     names = list(load_scenes("slime"))
     compared = [SimpleNamespace(liquid=name) for name in names if name not in ("slime", "ketchup")]
     monkeypatch.setattr(accuracy, "survey_scenes", lambda _scenes, _show: compared)
-    monkeypatch.setattr(accuracy, "survey_evidence", lambda found: Evidence("", {"survey.md": found[0].liquid}))
-    done = CliRunner().invoke(commands, ["accuracy", "slime", "--liquids", "--to", str(tmp_path)])
-    assert (done.exit_code, (tmp_path / "survey.md").read_text("utf-8")) == (0, compared[0].liquid), done.output
-    assert done.stdout.strip() == str(tmp_path / "survey.md")
+    monkeypatch.setattr(accuracy, "survey_evidence", lambda surveys: Evidence("", {"survey.md": surveys[0].liquid}))
+    result = CliRunner().invoke(commands, ["accuracy", "slime", "--liquids", "--to", str(tmp_path)])
+    assert (result.exit_code, (tmp_path / "survey.md").read_text("utf-8")) == (0, compared[0].liquid), result.output
+    assert result.stdout.strip() == str(tmp_path / "survey.md")
     omitted = ", ".join(name for name in names if name in ("slime", "ketchup"))
-    assert f"not compared, because references need a constant viscosity: {omitted}\n" in done.stderr
+    assert f"not compared, because references need a constant viscosity: {omitted}\n" in result.stderr

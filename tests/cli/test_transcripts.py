@@ -75,12 +75,12 @@ def workspace(
 
 
 def without_repeats(lines: list[str]) -> Iterator[str]:
-    """Yield commands, codes and files, and each line that is printed once, with # for numbers."""
-    seen = set[str]()
+    """Yield commands, codes and files, and each distinct printed line with # for numbers."""
+    lines_seen = set[str]()
     for line in lines:
         text = masked(line) if line.startswith(("| ", "! ")) else line
-        if not line.startswith(("| ", "! ")) or text not in seen:
-            seen.add(text)
+        if not line.startswith(("| ", "! ")) or text not in lines_seen:
+            lines_seen.add(text)
             yield text
 
 
@@ -89,8 +89,8 @@ def without_repeats(lines: list[str]) -> Iterator[str]:
 )
 def test_commands(golden: Path, workspace: Path, capsys: Any, monkeypatch: Any, pytestconfig: pytest.Config) -> None:
     def files() -> set[str]:
-        found = (path.relative_to(workspace) for path in workspace.rglob("*") if path.is_file())
-        return {str(path) for path in found}
+        paths = (path.relative_to(workspace) for path in workspace.rglob("*") if path.is_file())
+        return {str(path) for path in paths}
 
     @contextmanager
     def progress(_otherwise: Any = None) -> Iterator[Any]:
@@ -101,8 +101,8 @@ def test_commands(golden: Path, workspace: Path, capsys: Any, monkeypatch: Any, 
     changed, lines, before = Files(workspace), list[str](), files()
     for line in (line for line in golden.read_text("utf-8").splitlines() if line.startswith(("$ ", "@ "))):
         if line.startswith("@ "):
-            told = value_of(line[2:], {name: getattr(changed, name) for name in dir(changed)})
-            lines += [line, *(f"| {one}" for one in told or ())]
+            printed = value_of(line[2:], {name: getattr(changed, name) for name in dir(changed)})
+            lines += [line, *(f"| {line}" for line in printed or ())]
             before = files()
             continue
         words = shlex.split(line[2:])
@@ -113,9 +113,9 @@ def test_commands(golden: Path, workspace: Path, capsys: Any, monkeypatch: Any, 
             main()
         out, err = capsys.readouterr()
         now = files()
-        lines += [line, f"code {ended.value.code}", *(f"| {one}" for one in out.splitlines())]
-        lines += [*(f"! {one}" for one in err.splitlines()), *(f"+ {one}" for one in sorted(now - before))]
-        lines += [f"- {one}" for one in sorted(before - now)]
+        lines += [line, f"code {ended.value.code}", *(f"| {line}" for line in out.splitlines())]
+        lines += [*(f"! {line}" for line in err.splitlines()), *(f"+ {line}" for line in sorted(now - before))]
+        lines += [f"- {file}" for file in sorted(before - now)]
         before = now
     lines = [line.replace(str(workspace), "FOLDER").replace("python -m pytest.", "") for line in lines]
     compare(golden, without_repeats(lines), pytestconfig, mask=CHANGING)

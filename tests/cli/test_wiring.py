@@ -41,8 +41,8 @@ def patch(monkeypatch: pytest.MonkeyPatch, calls: list[tuple[Any, ...]]) -> Patc
 
             def called(*arguments: Any, _name: str = name, _value: Any = value, **options: Any) -> Any:
                 stated = ["show" if callable(argument) else argument for argument in arguments]
-                kept = {key: option for key, option in options.items() if not callable(option)}
-                calls.append((_name, *stated, *([kept] if kept else [])))
+                plain_options = {key: option for key, option in options.items() if not callable(option)}
+                calls.append((_name, *stated, *([plain_options] if plain_options else [])))
                 return _value(*arguments, **options) if callable(_value) else _value
 
             monkeypatch.setattr(f"{module}.{name}", called)
@@ -57,9 +57,9 @@ def patch(monkeypatch: pytest.MonkeyPatch, calls: list[tuple[Any, ...]]) -> Patc
 
 
 def run(*words: object, code: int = 0) -> list[str]:
-    done = CliRunner().invoke(commands, [str(word) for word in words])
-    assert done.exit_code == code, (done.output, done.exception)
-    return done.stdout.splitlines()
+    result = CliRunner().invoke(commands, [str(word) for word in words])
+    assert result.exit_code == code, (result.output, result.exception)
+    return result.stdout.splitlines()
 
 
 def evidence(text: str, **keys: Any) -> Evidence:
@@ -102,7 +102,7 @@ def fluid(patch: Patch) -> None:
         ("--score --to TO", ["score_all show"], ["scored", "TO/made.md"]),
     ],
 )  # fmt: skip
-def test_cfd_reads_or_solves_flows_and_fits_what_was_asked_for(
+def test_cfd_reads_or_solves_flows_and_fits_the_requested_models(
     fluid: None, calls: list[tuple[Any, ...]], tmp_path: Path, words: str, expected: list[str], printed: list[str]
 ) -> None:
     lines = run("cfd", *words.replace("TO", str(tmp_path)).split())
@@ -175,7 +175,7 @@ OUTLETS = "study_app.evidence.outlets"
         ("--spin 25", ["measure_timing 400.0 none windows {'spin_us': 25.0}", "timing_evidence timed"]),
     ],
 )  # fmt: skip
-def test_timing_measures_what_was_asked_for(
+def test_timing_runs_the_requested_measurements(
     patch: Patch,
     calls: list[tuple[Any, ...]],
     monkeypatch: pytest.MonkeyPatch,
@@ -191,8 +191,10 @@ def test_timing_measures_what_was_asked_for(
     monkeypatch.setattr("study_app.cli.evidence._windows_thread", lambda _load: "windows")
     events = "ending"
     lines = run("timing", "--seconds", 400, *words.split(), "--to", tmp_path)
-    told = [(*(part for part in call if not isinstance(part, dict)), *_without(call, events)) for call in calls]
-    assert [" ".join(map(str, call)) for call in told] == expected
+    recorded_calls = [
+        (*(part for part in call if not isinstance(part, dict)), *_without(call, events)) for call in calls
+    ]
+    assert [" ".join(map(str, call)) for call in recorded_calls] == expected
     assert lines[-1] == str(tmp_path / "made.md")
 
 
@@ -202,11 +204,11 @@ def _without(call: tuple[Any, ...], name: str) -> list[dict[str, Any]]:
     return [kept for kept in options if kept]
 
 
-def test_timing_refuses_what_cannot_be_combined() -> None:
+def test_timing_refuses_options_that_cannot_be_combined() -> None:
     run("timing", "--delays", "--lsl", code=2)
     for words in (("--delays", "--spin", 3), ("--lsl", "--seconds", 0.1), ("--triggers", "virtual", "--seconds", 9e9)):
-        done = CliRunner().invoke(commands, ["timing", *map(str, words)])
-        assert "StudyError" in repr(done.exception), words
+        result = CliRunner().invoke(commands, ["timing", *map(str, words)])
+        assert "StudyError" in repr(result.exception), words
 
 
 @pytest.mark.parametrize(("missed", "undecided", "code"), [(False, False, 0), (True, False, 3), (False, True, 4)])
@@ -283,8 +285,8 @@ def test_power_estimates_with_its_options_and_prints_the_last_estimate(
     monkeypatch.setattr("study_app.cli.power._write_estimate", lambda estimate, to: calls.append((estimate.text, to)))
     words = ("power", "viscosityjnd", "--trials", "30,20", "--studies", 40, "--workers", 2)
     run(*words, "--sizes", "9,6,9", "--seed", 5)
-    (name, study, executor, options), written = calls
-    assert (name, study.study.name, executor, written) == (
+    (name, study, executor, options), destination = calls
+    assert (name, study.study.name, executor, destination) == (
         "estimate_power",
         "viscosityjnd",
         "2 workers",
@@ -317,7 +319,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_studies_and_sessions_are_listed_with_what_can_be_done_with_them(workspace: Path, tmp_path: Path) -> None:
+def test_studies_and_sessions_are_listed_with_their_next_steps(workspace: Path, tmp_path: Path) -> None:
     results = workspace / "results"
     lines = run("studies")
     assert lines[0].startswith(f"Protocols in {workspace / 'protocols'}")
@@ -328,17 +330,20 @@ def test_studies_and_sessions_are_listed_with_what_can_be_done_with_them(workspa
     assert lines[-2:] == [f"Studies in {results}", "  demo  2 sessions"]
     run("exclude", "demo", "--participant", "P002", "--by", "AK", "--reason", "asleep")
     run("exclude", "demo", "--participant", "P001", "--trial", 2, "--by", "AK", "--reason", "coughed")
-    started = {}
+    start_of = {}
     for person in ("P001", "P002"):
         journal = StudyFolder(results / "demo").session(person, 1).journal.read_text(encoding="utf-8")
-        started[person] = datetime.fromisoformat(re.search(r'"at":\s*"([^"]+)"', journal)[1])
-    told = {person: time.astimezone().isoformat(" ", "minutes") for person, time in started.items()}
-    expected = [f"demo/P001/1  {told['P001']}  completed", f"demo/P002/1  {told['P002']}  completed  excluded"]
+        start_of[person] = datetime.fromisoformat(re.search(r'"at":\s*"([^"]+)"', journal)[1])
+    start_times = {person: time.astimezone().isoformat(" ", "minutes") for person, time in start_of.items()}
+    expected = [
+        f"demo/P001/1  {start_times['P001']}  completed",
+        f"demo/P002/1  {start_times['P002']}  completed  excluded",
+    ]
     assert run("sessions") == run("sessions", "demo") == expected
     elsewhere = tmp_path / "elsewhere"
     (results / "demo").rename(elsewhere)
     session = StudyFolder(elsewhere).session("P001", 1).path
-    assert run("sessions", "--results", elsewhere)[0] == f"{session}  {told['P001']}  completed"
+    assert run("sessions", "--results", elsewhere)[0] == f"{session}  {start_times['P001']}  completed"
     assert run("rebuild", "P001/1", "--results", elsewhere) == run("rebuild", session)
     assert run("sessions") == []
 
@@ -381,11 +386,12 @@ def test_docs_print_a_page_or_the_section_that_fits_best(monkeypatch: pytest.Mon
         SimpleNamespace(page=f"page{number}", heading=f"Heading {number}", source=f" text {number}\n")
         for number in range(1, 9)
     ]
-    asked = list[str]()
+    opened_pages = list[str]()
     monkeypatch.setattr("study_app.documentation.names", lambda: ("first", "second"))
     monkeypatch.setattr("study_app.documentation.page", lambda name: f"the page {name}")
     monkeypatch.setattr(
-        "study_app.documentation.search", lambda query: asked.append(query) or (sections if "thick" in query else ())
+        "study_app.documentation.search",
+        lambda query: opened_pages.append(query) or (sections if "thick" in query else ()),
     )
     assert run("docs") == ["first", "second"]
     assert run("docs", "second") == ["the page second"]
@@ -393,7 +399,7 @@ def test_docs_print_a_page_or_the_section_that_fits_best(monkeypatch: pytest.Mon
         "page1: Heading 1", "", "text 1", "", *(f"see also  page{number}: Heading {number}" for number in range(2, 6)),
     ]  # fmt: skip
     run("docs", "thin", code=2)
-    assert asked == ["thick oil", "thin"]
+    assert opened_pages == ["thick oil", "thin"]
 
 
 def test_the_model_is_simulated_and_described_with_the_stated_changes(
@@ -420,7 +426,7 @@ def test_the_model_is_simulated_and_described_with_the_stated_changes(
     assert every[:5] == ["cost of water ", "error at 1", "effects of water", "", "cost of honey "]
 
 
-def test_outputs_are_made_where_they_were_asked_for_and_failures_are_told(
+def test_outputs_are_written_to_the_requested_folder_and_failures_reported(
     patch: Patch, calls: list[tuple[Any, ...]], tmp_path: Path
 ) -> None:
     to, results = tmp_path / "out", tmp_path / "kept"
@@ -432,33 +438,39 @@ def test_outputs_are_made_where_they_were_asked_for_and_failures_are_told(
 
     patch("study_app.analysis.report", plot=[to / "a.png"], report=reported)
     assert run("plot", results, "--to", to) == [str(to / "a.png")]
-    done = CliRunner().invoke(commands, ["report", "--results", str(results), "--to", str(to)])
-    assert done.stdout == f"{to / 'report.html'}  and 2 more files in the same folder\n"
-    assert (done.exit_code, done.stderr.splitlines()[-1]) == (3, "figures failed")
+    result = CliRunner().invoke(commands, ["report", "--results", str(results), "--to", str(to)])
+    assert result.stdout == f"{to / 'report.html'}  and 2 more files in the same folder\n"
+    assert (result.exit_code, result.stderr.splitlines()[-1]) == (3, "figures failed")
     assert [call[:3] for call in calls] == [("plot", results, to), ("report", results, to)]
     run("export", results, "--to", to, "--validator", __file__, code=2)
     run("report", "demo", "--results", results, "--to", to, code=2)
 
 
-def test_a_rebuilt_session_names_each_file_and_what_it_left(patch: Patch, tmp_path: Path) -> None:
+def test_rebuild_prints_each_rewritten_removed_kept_and_lost_file(patch: Patch, tmp_path: Path) -> None:
     session = tmp_path / "ses-01"
     session.mkdir()
-    rebuilt = SimpleNamespace(rewritten=(Path("a.csv"),), swept=(Path("b.part"),), torn_bytes=1)
+    rebuilt = SimpleNamespace(
+        rewritten=(Path("a.csv"),), swept=(Path("b.part"),), torn_bytes=1, lost=(Path("session.json"),)
+    )
     patch("study_app.store.sessions", rebuild_session=rebuilt)
     torn = "the journal ends with an incomplete line of 1 byte, which has been kept"
-    assert run("rebuild", session) == ["rewritten  a.csv", "removed    b.part, an incomplete file", torn]
-    patch("study_app.store.sessions", rebuild_session=SimpleNamespace(rewritten=(), swept=(), torn_bytes=0))
+    result = CliRunner().invoke(commands, ["rebuild", str(session)])
+    assert result.exit_code == 0, (result.output, result.exception)
+    assert result.stdout.splitlines() == ["rewritten  a.csv", "removed    b.part, an incomplete file", torn]
+    lost = "warning: session.json is missing and cannot be rebuilt; restore it from a backup"
+    assert result.stderr.splitlines() == [lost]
+    patch("study_app.store.sessions", rebuild_session=SimpleNamespace(rewritten=(), swept=(), torn_bytes=0, lost=()))
     assert run("rebuild", session) == ["nothing to do: every table agrees with the journal"]
 
 
-def test_a_check_of_results_tells_errors_warnings_plug_ins_and_the_verdict(
+def test_verify_prints_errors_warnings_plug_ins_and_the_verdict(
     patch: Patch, calls: list[tuple[Any, ...]], tmp_path: Path
 ) -> None:
     class Finding(SimpleNamespace):
         def __str__(self) -> str:
             return str(self.text)
 
-    found = SimpleNamespace(
+    findings = SimpleNamespace(
         errors=(Finding(text="broken"),),
         warnings=(Finding(text="tell the others", shares=True), Finding(text="unusual", shares=False)),
         plug_ins={"extra": ("a", "b")},
@@ -466,16 +478,16 @@ def test_a_check_of_results_tells_errors_warnings_plug_ins_and_the_verdict(
         sessions=4,
         is_sound=False,
     )
-    patch("study_app.store.verification", verify_study=found, check_recording=["2 markers were lost"])
+    patch("study_app.store.verification", verify_study=findings, check_recording=["2 markers were lost"])
     words = ("--fingerprints", "kept.txt", "--xdf", "own.xdf")
     lines = ["error: broken", "warning: unusual", "before sharing: tell the others", "plug-in extra: a, b"]
     assert run("verify", tmp_path, *words, code=3) == [
         *lines, "2 markers were lost", "4 sessions, 1 running: not sound",
     ]  # fmt: skip
     assert calls == [
-        ("verify_study", tmp_path, Path("kept.txt")), ("check_recording", Path("own.xdf"), tmp_path, found),
+        ("verify_study", tmp_path, Path("kept.txt")), ("check_recording", Path("own.xdf"), tmp_path, findings),
     ]  # fmt: skip
-    found.errors, found.running, found.is_sound = (), 0, True
+    findings.errors, findings.running, findings.is_sound = (), 0, True
     assert run("verify", tmp_path)[-1] == "4 sessions: sound"
 
 
@@ -483,8 +495,8 @@ def test_a_proof_is_printed_or_written_and_its_settings_are_remembered(
     patch: Patch, calls: list[tuple[Any, ...]], tmp_path: Path
 ) -> None:
     patch("study_app.store.verification", proof_text="line of proof\n")
-    study, kept, root = (tmp_path / name for name in ("study", "kept", "root.pem"))
-    for folder in (study, kept):
+    study, proof_file, root = (tmp_path / name for name in ("study", "kept", "root.pem"))
+    for folder in (study, proof_file):
         folder.mkdir()
     root.write_text("PEM", encoding="utf-8", newline="\n")
     before = workstation.load_settings()
@@ -492,12 +504,16 @@ def test_a_proof_is_printed_or_written_and_its_settings_are_remembered(
     assert calls.pop()[2] == {"server": "https://one.example", "sign": None}
     assert workstation.load_settings() == before
     to = tmp_path / "proof.txt"
-    words = ("--sign", "--server", "https://two.example", "--root", root, "--always", kept, "--to", to)
+    words = ("--sign", "--server", "https://two.example", "--root", root, "--always", proof_file, "--to", to)
     assert run("proof", study, *words) == [str(to)]
     assert to.read_text(encoding="utf-8") == "line of proof\n"
     assert calls.pop()[2] == {"server": "https://two.example", "sign": True}
     settings = workstation.load_settings()
-    assert (settings.proofs, settings.stamps, settings.stamp_root) == (str(kept), "https://two.example", str(root))
+    assert (settings.proofs, settings.stamps, settings.stamp_root) == (
+        str(proof_file),
+        "https://two.example",
+        str(root),
+    )
 
 
 @pytest.mark.parametrize(
@@ -512,19 +528,19 @@ def test_a_proof_is_printed_or_written_and_its_settings_are_remembered(
 def test_workers_are_counted_or_those_of_a_cluster(
     monkeypatch: pytest.MonkeyPatch, patch: Patch, words: tuple[str, ...], workers: Workers
 ) -> None:
-    asked = list[Workers]()
+    requested_workers = list[Workers]()
 
     @contextmanager
     def executor_for(chosen: Workers) -> Iterator[None]:
-        asked.append(chosen)
+        requested_workers.append(chosen)
         yield
 
     patch(STABILITY, measure_withheld_force="withheld", withheld_force_evidence=evidence("held"))
     monkeypatch.setattr("study_app.cli.evidence.executor_for", executor_for)
     run("stability", "--withheld", *words)
-    assert asked == [workers]
+    assert requested_workers == [workers]
     run("stability", "--withheld", "--workers", 2, "--cluster", "tcp://host:1", code=2)
     run("stability", "--withheld", "--workers", 0, code=2)
     monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", "tcp://other:2")
     run("stability", "--withheld", *words)
-    assert asked[1] == (workers if words else Workers(cluster="tcp://other:2"))
+    assert requested_workers[1] == (workers if words else Workers(cluster="tcp://other:2"))

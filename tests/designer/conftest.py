@@ -1,4 +1,4 @@
-"""The designer in the main window, and what is made of it by many tests."""
+"""Fixtures of the designer in the main window."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -16,15 +16,15 @@ from tests.designer.support.story import NEVER_MS, Story
 @pytest.fixture
 def designer(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Designer]:
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    made = Designer(tmp_path)
-    qtbot.waitUntil(made.window.isActiveWindow)
-    yield made
-    made.close()
+    designer = Designer(tmp_path)
+    qtbot.waitUntil(designer.window.isActiveWindow)
+    yield designer
+    designer.close()
 
 
 @pytest.fixture
 def story(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Story]:
-    """Return what begins a story: the participant's page stands still, typing is one step, and drafts are due."""
+    """Return a function that begins a story: the live page is frozen, typing is one step, and drafts are due."""
     for module in ("document.document", "editing", "participant.preview"):
         monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(perf_counter=lambda: 1000.0))
     monkeypatch.setattr("study_app.designer.saving.time", SimpleNamespace(perf_counter=lambda: 2000.0))

@@ -44,7 +44,7 @@ def _move(items: list[Any], at: int, name: str) -> None:
 
 
 def _expected(before: Any, after: Any, path: Path, row: Row | None, at: int | None, name: str) -> Any:
-    """Return the document that a button should leave; what a new element holds is taken from ``after``."""
+    """Return the expected document after a button; contents of a new element are taken from ``after``."""
     study = deepcopy(before)
     element, parent = _at(study, path), _at(study, path[:-1])
     is_entry = isinstance(path[-1], int)
@@ -134,7 +134,7 @@ def _usable_buttons(designer: Any) -> dict[tuple[Any, Any, str], QAbstractButton
     ],
     ids=str,
 )
-def test_each_button_of_a_form_changes_what_its_name_says(designer: Any, path: Path) -> None:
+def test_each_button_of_a_form_changes_the_key_that_it_names(designer: Any, path: Path) -> None:
     designer.open("kitchen")
     designer.editing.make_step("Change", Set(("blocks", "liquids", "conditions"), CONDITIONS))
     designer.go_to(*path)
@@ -196,7 +196,7 @@ def test_each_number_of_a_form_has_the_unit_of_its_key_beside_it(designer: Any) 
         for part in designer.place.form.rows:
             key = str(part.row.path[-1])
             unit = next((unit for suffix, unit in UNITS.items() if key.endswith(f"_{suffix}")), "")
-            texts = {shown.text() for shown in part.findChildren(QLabel) if not shown.isHidden()}
+            texts = {label.text() for label in part.findChildren(QLabel) if not label.isHidden()}
             if part.row.kind in {"number", "whole number"}:
                 assert texts & {*UNITS.values()} == {unit} - {""}, part.row.path
                 units.add(unit)

@@ -15,7 +15,7 @@ from study_app.designer.document.steps import ChangeLanguage, RetypeFile, SetVal
 from study_app.protocol.source.document import Path
 from tests.designer.document.test_commands import elements, generic, studies
 from tests.designer.support.story import Story
-from tests.gui.transcript import compare, told
+from tests.gui.transcript import compare, widget_lines
 from tests.protocol.edited_studies import text_of
 
 TABS = ("measures", "file", "changes", "participant")
@@ -24,11 +24,11 @@ LISTED = ("blocks", "liquids", "conditions")
 
 def one_of_each(document: Any, but: Mapping[str, Any] = MappingProxyType({})) -> list[Path]:
     """Return the first element of each kind, without the kinds that another study has."""
-    found: dict[Path, Path] = {}
+    first_paths: dict[Path, Path] = {}
     for path in elements(document):
-        found.setdefault(generic(path), path)
+        first_paths.setdefault(generic(path), path)
     known = {generic(path) for path in elements(but)} if but else set()
-    return [path for kind, path in found.items() if kind not in known and path != ("format",)]
+    return [path for kind, path in first_paths.items() if kind not in known and path != ("format",)]
 
 
 def each_element(story: Story) -> None:
@@ -61,8 +61,8 @@ def problems(story: Story) -> None:
 def new_study(story: Story) -> None:
     story.play("ctrl+n")
     page = story.designer.place.new_page
-    for one in page.buttons[:6]:
-        story.act(f"choose {one.accessibleName()}", lambda one=one: one.setChecked(True))
+    for button in page.buttons[:6]:
+        story.act(f"choose {button.accessibleName()}", lambda button=button: button.setChecked(True))
     story.act("make", page.card.make.click)
     story.act("title", lambda: page.card.questions.title.setText("Which is thicker?"))
     story.act("make", page.card.make.click)
@@ -132,25 +132,25 @@ FLOWS: tuple[Callable[[Story], None], ...] = (
 
 
 @pytest.mark.slow
-def test_what_the_designer_tells(story: Callable[..., Story], pytestconfig: pytest.Config) -> None:
-    told = story()
-    text, lines = told.text, list[str]()
-    told.drafts_are_kept = False  # the file is written anew before each flow
+def test_spoken_texts_of_the_designer(story: Callable[..., Story], pytestconfig: pytest.Config) -> None:
+    played = story()
+    text, lines = played.text, list[str]()
+    played.drafts_are_kept = False  # the file is written anew before each flow
     for flow in FLOWS[:6]:
-        told.text = text
-        told.designer.file.write_text(text, encoding="utf-8", newline="\n")
-        told.designer.window.resize(1600, 1000)
-        told.act("open", told.designer.open)
-        told.lines = []
-        flow(told)
-        lines += [f"== {flow.__name__}", *told.lines]
-        told.lines = None
+        played.text = text
+        played.designer.file.write_text(text, encoding="utf-8", newline="\n")
+        played.designer.window.resize(1600, 1000)
+        played.act("open", played.designer.open)
+        played.lines = []
+        flow(played)
+        lines += [f"== {flow.__name__}", *played.lines]
+        played.lines = None
     compare("designer", lines, pytestconfig)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("flow", FLOWS)
-def test_each_act_of_a_flow_leaves_what_is_shown_consistent(
+def test_each_act_of_a_flow_leaves_the_window_consistent(
     story: Callable[..., Story], flow: Callable[[Story], None]
 ) -> None:
     acted = story()
@@ -169,6 +169,6 @@ def test_each_tab_shows_each_element(story: Callable[..., Story], name: str, but
         assert place.form.head.title.text(), path
         for tab in TABS:
             acted.act(f"tab {tab}", lambda tab=tab: place.show_tab(tab))
-            assert len(told(place.pane)) > len(told(place.pane.tabs)), (path, tab)
+            assert len(widget_lines(place.pane)) > len(widget_lines(place.pane.tabs)), (path, tab)
         assert place.file.editor.toPlainText() == designer.text
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

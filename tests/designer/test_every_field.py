@@ -1,4 +1,4 @@
-"""Each plain field of a form changes its own key, and shows it; one undo takes it back, and a redo repeats it.
+"""Each plain field of a form changes and shows its own key; one undo reverts it, and a redo repeats it.
 
 `test_buttons.py` has the buttons of a form.
 """
@@ -38,7 +38,7 @@ def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
 
 
 def uses(designer: Any, field: Any) -> Iterator[tuple[Callable[[Any], object], Any]]:
-    """Yield what a user can put into a field, and the value of its key then; a text by its language."""
+    """Yield each input of a user into a field, and the resulting value of its key; a text by its language."""
     row, kind = field.row, type(field).__name__
     if kind == "LineField" and row.kind in TYPED:
         text, value = TYPED[row.kind]
@@ -75,8 +75,8 @@ def _choose(field: Any, words: str) -> None:
         box.activated.emit(next(at for at in range(box.count()) if box.itemText(at).startswith(words)))
 
 
-def shown(field: Any) -> Any:
-    """Return what a field shows."""
+def shown_value(field: Any) -> Any:
+    """Return the shown value of a field."""
     match type(field).__name__:
         case "LineField":
             return field.line.typed_text()
@@ -112,12 +112,12 @@ def test_each_field_changes_its_own_key(designer: Any) -> None:
 
 
 def _use_field(designer: Any, path: Path) -> None:
-    """Put something else into a field, in each way, and check the key, the field and the step."""
+    """Change a field in each possible way; check the key, the field and the step."""
     row = designer.form_row(*path)
     if type(row.field).__name__ == "LineField" and row.row.unit:
         assert unit_of(str(path[-1])) in [part.text() for part in row.field.findChildren(QLabel)]
     for use, value in uses(designer, row.field):
-        before, text, was = dict(leaves(designer.study.document)), designer.text, shown(designer.field(*path))
+        before, text, was = dict(leaves(designer.study.document)), designer.text, shown_value(designer.field(*path))
         use(designer.field(*path))
         QApplication.processEvents()
         now, after = designer.value(*path), dict(leaves(designer.study.document))
@@ -132,10 +132,10 @@ def _use_field(designer: Any, path: Path) -> None:
             assert {key[: len(path)] for key in different} == {path}
         if row.row.kind != "kind":
             assert designer.steps[-1] in {f"Change {row.row.label}", f"Type {row.row.label}"}
-        changed, then = designer.text, shown(designer.field(*path))
+        changed, then = designer.text, shown_value(designer.field(*path))
         assert then != was
         for go, expected in ((designer.editing.undo, (text, was)), (designer.editing.redo, (changed, then))):
             go()
             QApplication.processEvents()
-            assert (designer.text, shown(designer.field(*path))) == expected, path
+            assert (designer.text, shown_value(designer.field(*path))) == expected, path
         designer.undo_all()

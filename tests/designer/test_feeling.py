@@ -1,4 +1,4 @@
-"""Feel it: from the form to the lab with unsaved values, and back into the study as one step, in the main window."""
+""" "Feel it": from the form to the lab with unsaved values, and back into the study as one step."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,27 +20,27 @@ OPENS_MS = 60_000
 
 @pytest.fixture
 def visit(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[MainController]:
-    """The main window, with a copy of the demo open in the designer."""
+    """Yield the main controller, with a copy of the demo open in the designer."""
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     file = tmp_path / "protocols" / "kitchen.toml"
     file.parent.mkdir()
     file.write_bytes(shipped_file("demo").read_bytes().replace(b'name = "demo"', b'name = "kitchen"'))
-    made = MainController(tmp_path / "results")
-    made.window.resize(1600, 1000)
-    made.window.show()
-    made.open_designer("kitchen")
-    qtbot.waitUntil(lambda: made.designer is not None and made.designer.editing.opened is not None, timeout=OPENS_MS)
-    yield made
-    made.window.close()
-    made.end()
-    assert made.designer is not None
-    made.designer.deleteLater()
-    made.window.deleteLater()
+    main = MainController(tmp_path / "results")
+    main.window.resize(1600, 1000)
+    main.window.show()
+    main.open_designer("kitchen")
+    qtbot.waitUntil(lambda: main.designer is not None and main.designer.editing.opened is not None, timeout=OPENS_MS)
+    yield main
+    main.window.close()
+    main.end()
+    assert main.designer is not None
+    main.designer.deleteLater()
+    main.window.deleteLater()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def feel(qtbot: Any, visit: MainController, *path: str) -> Any:
-    """Select an element, press its button, and return the lab once it is felt."""
+    """Select an element, press its button, and return the lab once it presents the liquid."""
     assert visit.designer is not None
     visit.designer.editing.select(path)
     head = visit.designer.place.form.head
@@ -109,13 +109,13 @@ def test_the_lab_puts_nothing_back_once_another_study_is_open(qtbot: Any, visit:
     qtbot.waitUntil(lambda: not lab.place.form.back.isVisible(), timeout=OPENS_MS)
 
 
-def test_home_shows_what_is_saved_and_kept_and_a_signal_ends_what_is_played(visit: MainController) -> None:
-    done: list[object] = []
-    visit.window.place("home").show_studies = lambda: done.append("shown")  # type: ignore[attr-defined]
+def test_home_shows_saved_and_kept_studies_and_a_signal_ends_playing(visit: MainController) -> None:
+    events: list[object] = []
+    visit.window.place("home").show_studies = lambda: events.append("shown")  # type: ignore[attr-defined]
     assert visit.designer is not None
     assert visit.playing is not None
-    visit.playing.end_by_signal = done.append  # type: ignore[method-assign]
+    visit.playing.end_by_signal = events.append  # type: ignore[method-assign]
     visit.designer.saving.saved.emit(visit.results)
     visit.playing.kept.emit(visit.results)
     visit.end_by_signal(15)
-    assert done == ["shown", "shown", 15]
+    assert events == ["shown", "shown", 15]

@@ -1,4 +1,4 @@
-"""The editor of a study's file: marks, cursor and what is typed, while the file changes elsewhere."""
+"""The editor of a study's file: marks, cursor and typing, while the file changes elsewhere."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,16 +14,16 @@ LINES = ["[study]", 'name = "a"', "", "[scene]", "scale = 1"]
 
 @pytest.fixture
 def card(qtbot: Any) -> Iterator[FileCard]:
-    made = FileCard()
-    qtbot.addWidget(made)
-    made.resize(400, 300)
-    made.show()
-    made.activateWindow()
-    qtbot.waitUntil(made.isActiveWindow)
-    made.editor.clearFocus()
-    made.show_file(FileText("a.toml", "\n".join(LINES), ((3, 4),), (1,)), scroll=True, read_only=False)
-    yield made
-    made.editor.flush()
+    card = FileCard()
+    qtbot.addWidget(card)
+    card.resize(400, 300)
+    card.show()
+    card.activateWindow()
+    qtbot.waitUntil(card.isActiveWindow)
+    card.editor.clearFocus()
+    card.show_file(FileText("a.toml", "\n".join(LINES), ((3, 4),), (1,)), scroll=True, read_only=False)
+    yield card
+    card.editor.flush()
 
 
 def test_the_selected_element_is_shown_and_its_lines_are_marked(card: FileCard) -> None:
@@ -67,7 +67,7 @@ def test_a_change_elsewhere_moves_neither_cursor_nor_is_it_typed_text(card: File
     assert (editor.pending, typed) == (False, [])
 
 
-def test_typed_text_is_told_after_a_pause_and_at_once_where_the_keyboard_leaves(card: FileCard, qtbot: Any) -> None:
+def test_typed_text_is_sent_after_a_pause_and_at_once_when_the_focus_leaves(card: FileCard, qtbot: Any) -> None:
     editor, typed = card.editor, list[str]()
     editor.typed.connect(typed.append)
     editor.setFocus()

@@ -19,7 +19,7 @@ from study_app.store.versions.study_versions import content_hash
 from tests.designer.support.designer import DEMO
 from tests.designer.support.runs import run
 from tests.designer.support.story import Story
-from tests.gui.transcript import told
+from tests.gui.transcript import widget_lines
 
 pytestmark = pytest.mark.slow
 REPETITIONS = ("blocks", "liquids", "repetitions")
@@ -134,7 +134,7 @@ def others(story: Story) -> None:
     assert "A third look" in designer.file.read_text("utf-8"), "not overwritten while that is asked"
     story.play("[Use the file's]")
     story.expect(undo="Use the file's content", kept="saved")
-    story.has('title = "A third look"', 'version = "1.0"')
+    story.has('title = "A third look"', 'version = "1.1"')
     story.ask(SetValue(VERSION, "0.8"))
     outside("A third look", "A fourth look")
     story.expect(both)
@@ -145,7 +145,7 @@ def others(story: Story) -> None:
     session = designer.results / "kitchen" / "data" / "sub-P001" / "ses-01"
     session.mkdir(parents=True)
     opening = lock_folder(session)
-    outside("Now reach", "Reach now")
+    outside("Reaching", "Reach now")
     story.expect("A session of this study is running. Make a copy, or wait until it has ended.")
     story.ask(SetValue(VERSION, "1.0"))
     story.play("ctrl+s")
@@ -180,7 +180,7 @@ def refusing(name: str, words: str) -> Iterator[None]:
 
 
 def failing(story: Story) -> None:
-    """What cannot be deleted, kept, read or written is said once, and nothing is lost."""
+    """Failures to delete, keep, read or write are reported once, and nothing is lost."""
     designer, saving = story.designer, story.designer.saving
     write, look = (partial(story.act, "write", saving.write_draft), partial(story.act, "look", saving.check_file))
     denied, not_up_to_date = "the draft cannot be deleted: Permission denied", "The draft is not up to date: the draft"
@@ -256,11 +256,11 @@ def versions(story: Story) -> None:
     story.play("ctrl+s")
     story.expect(kept="edited", undo="Type Title")
     story.act("version", prompt().version.setFocus)
-    story.play("ctrl+a '1.0' Return")
-    story.expect(kept="edited", at="Version to save as")
     story.play("ctrl+a '1.1' Return")
-    story.expect(kept="saved", undo="Set version 1.1")
-    story.has('version = "1.1"', 'title = "Hello"')
+    story.expect(kept="edited", at="Version to save as")
+    story.play("ctrl+a '1.2' Return")
+    story.expect(kept="saved", undo="Set version 1.2")
+    story.has('version = "1.2"', 'title = "Hello"')
     story.ask(SetValue(REPETITIONS, 4))
     story.play("ctrl+s")
     story.expect(kept="saved")
@@ -269,11 +269,11 @@ def versions(story: Story) -> None:
     story.act("compare", lambda: card.compare_with(card.version.itemData(1)))
     story.act("restore", card.restore.click)
     assert designer.text == as_run
-    assert designer.steps[-1].startswith("Restore 1.0: 2 sessions, last 20 Nov")
+    assert designer.steps[-1].startswith("Restore 1.1: 2 sessions, last 20 Nov")
     story.play("ctrl+z")
-    story.has('version = "1.1"', "repetitions = 4")
+    story.has('version = "1.2"', "repetitions = 4")
     ran("P003")
-    ran("P001", study="pantry", source=designer.file.read_bytes().replace(b'"1.1"', b'"0.1"'))
+    ran("P001", study="pantry", source=designer.file.read_bytes().replace(b'"1.2"', b'"0.1"'))
     story.ask(SetValue(REPETITIONS, 5))
     story.act("save as pantry", lambda: designer.saving.save_as_another("pantry"))
     story.expect(
@@ -300,11 +300,11 @@ def versions(story: Story) -> None:
     story.play("@pages.welcome ctrl+z")
     story.expect(selected="questionnaires.delay.items.0", kept="saved")
     story.play("@questionnaires.delay.items.0")
-    early = designer.file.read_bytes().replace(b'"1.1"', b'"0.9"').replace(b"delay_ms = 200", b"delay_ms = 300")
+    early = designer.file.read_bytes().replace(b'"1.2"', b'"0.9"').replace(b"delay_ms = 200", b"delay_ms = 300")
     ran("P009", early, started_at="2026-11-18T12:00:00+00:00")
     story.act("compare", lambda: card.compare_with(protocol_hash(early)))
-    differences = " ".join(told(designer.place.pane))
-    assert 'study.version: previously "0.9", now "1.1"' in differences
+    differences = " ".join(widget_lines(designer.place.pane))
+    assert 'study.version: previously "0.9", now "1.2"' in differences
     assert "300" not in differences, "what the conditions were is sealed"
 
 
@@ -319,7 +319,9 @@ def incomplete(story: Story) -> None:
     story.play("[Show the list] @device")
     (line,) = story.designer.place.problems.lines
     assert line.row.message == f"{count} texts are missing in Dutch"
-    assert "missing" not in " ".join(told(story.designer.place.form)), "no field complains before it was filled in"
+    assert "missing" not in " ".join(widget_lines(story.designer.place.form)), (
+        "no field complains before it was filled in"
+    )
     story.ask(ChangeLanguage("copy", "nl"))
     story.expect("No problems", "1 warning", undo="Fill in Dutch")
     story.play("ctrl+s")
@@ -327,7 +329,7 @@ def incomplete(story: Story) -> None:
 
 
 def typed_into_the_file(story: Story) -> None:
-    """What is typed into the file stays there where the form is made anew; a fault reaches its field."""
+    """Text typed into the file stays when the form is rebuilt; a fault is shown at its field."""
     editor = story.designer.place.file.editor
 
     def go_to(line: str, end: bool) -> None:
@@ -369,7 +371,9 @@ def unreadable(story: Story) -> None:
 @pytest.mark.parametrize(
     "tell", [drafts, banner, never_saved, others, failing, versions, incomplete, typed_into_the_file]
 )
-def test_each_act_changes_what_it_should(tell_story: Callable[..., None], tell: Callable[[Story], None]) -> None:
+def test_each_act_of_a_story_leaves_the_window_consistent(
+    tell_story: Callable[..., None], tell: Callable[[Story], None]
+) -> None:
     tell_story(tell)
 
 

@@ -22,7 +22,7 @@ from study_app.designer.document.steps import (
 )
 from tests.designer.support.designer import DEMO
 from tests.designer.support.story import Story
-from tests.gui.transcript import told
+from tests.gui.transcript import widget_lines
 
 pytestmark = pytest.mark.slow
 REPETITIONS = ("blocks", "liquids", "repetitions")
@@ -122,7 +122,7 @@ def questions(story: Story) -> None:
 def fields(story: Story) -> None:
     """What is refused stays with its reason until Esc; the next element shows nothing of the one before."""
     designer = story.designer
-    field, form = designer.field, lambda: " ".join(told(designer.place.form))
+    field, form = designer.field, lambda: " ".join(widget_lines(designer.place.form))
     story.play("@blocks.liquids :blocks.liquids.repetitions ctrl+a '2x' Tab")
     assert field(*REPETITIONS).line.text() == "2x"
     assert "“2x” is not a number" in form()
@@ -177,7 +177,7 @@ def adaptive(story: Story) -> None:
     levels = story.designer.value("methods", "easy", "levels")
     story.play("@methods.easy :methods.easy.levels ctrl+a '0.5 x' Return")
     assert "“x” is not a number. The study still contains 0.5; press Esc to restore it." in " ".join(
-        told(story.designer.place.form)
+        widget_lines(story.designer.place.form)
     )
     story.play("Escape")
     assert story.designer.value("methods", "easy", "levels") == levels
@@ -255,11 +255,11 @@ def repairs(story: Story) -> None:
     story.expect("4 problems")
     story.play("ctrl+1 ctrl+4")
     story.act("pointer over it", lambda: pointer(QEnterEvent(QPointF(5, 5), QPointF(5, 5), QPointF(5, 5))))
-    shown = [line.row.fault for line in problems.lines]
+    faults_before = [line.row.fault for line in problems.lines]
     story.act("repair", lambda: designer.click_on(next(line for line in problems.lines if line.repairs).repairs[0]))
     story.expect("3 problems", undo="Use 8", selected="device", at="Force limit")
     assert designer.value("device", "force_limit_n") == 8
-    assert [line.row.fault for line in problems.lines] == shown, "no line moves below the pointer"
+    assert [line.row.fault for line in problems.lines] == faults_before, "no line moves below the pointer"
     story.ask(SetValue(VERSION, 3))
     assert [line.row.fault for line in problems.lines] == [row.fault for row in designer.place.view.problems]
     story.act("pointer away", lambda: pointer(QEvent(QEvent.Type.Leave)))
@@ -425,7 +425,7 @@ def asked_when(story: Story) -> None:
         ),
         ("At the end", 'sequence = ["welcome", "liquids", "reaching", "delays", "nasa_tlx", "thanks"]'),
     ):
-        action = next(one for one in head.asks.actions() if one.text().startswith(words))
+        action = next(entry for entry in head.asks.actions() if entry.text().startswith(words))
         story.act(action.text(), action.trigger)
         story.has(line)
         story.play("ctrl+z")
@@ -456,5 +456,7 @@ STORIES = (
 
 
 @pytest.mark.parametrize("tell", STORIES)
-def test_each_act_changes_what_it_should(tell_story: Callable[..., None], tell: Callable[[Story], None]) -> None:
+def test_each_act_of_a_story_leaves_the_window_consistent(
+    tell_story: Callable[..., None], tell: Callable[[Story], None]
+) -> None:
     tell_story(tell)

@@ -1,4 +1,4 @@
-"""The form: what is shown is no edit, and special editors ask for the same steps as those they replace."""
+"""The form: showing a value is not an edit, and special editors request the same steps as plain ones."""
 
 from dataclasses import replace
 from typing import Any
@@ -33,25 +33,27 @@ from study_app.designer.window import focus_stops
 from study_app.gui.theme import font
 from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.controls import IconButton
+from study_app.protocol.load import parse
 from tests.gui.walk import settle
+from tests.protocol.edited_studies import text_of
 
 pytestmark = pytest.mark.slow
 
 
 def test_forms_leave_no_wrapper_of_an_item_of_their_layouts(qtbot: Any, designer: Any) -> None:
-    """An event at the address of an item that Qt has deleted would get the wrapper, and a key would fail."""
+    """Otherwise an event at the address of a deleted item would get its wrapper, and a key press would fail."""
     designer.controller.begin_study("template:viscosity-jnd", "thicker")
     for row in [("study",), *((name, id) for name, ids in designer.study.document.items()
                               if isinstance(ids, dict) for id in ids if isinstance(ids[id], dict))]:  # fmt: skip
         designer.go_to(*row)
     qtbot.wait(50)
-    assert [one for one in shiboken6.getAllValidWrappers() if type(one) is QWidgetItem] == []
+    assert [wrapper for wrapper in shiboken6.getAllValidWrappers() if type(wrapper) is QWidgetItem] == []
 
 
 @pytest.mark.variants(3)
 @pytest.mark.parametrize("path", [("pages", "welcome", "body"), ("questionnaires", "liquid", "items", 0, "text")])
 @pytest.mark.parametrize("text", ["a\rb", "a\u2029b", "a\r\nb"])
-def test_a_shown_text_that_qt_normalises_is_no_edit(
+def test_qt_normalising_a_shown_text_is_not_an_edit(
     qtbot: Any, designer: Any, path: tuple[str | int, ...], text: str
 ) -> None:
     designer.open("kitchen")
@@ -80,7 +82,7 @@ def test_a_row_that_stays_keeps_its_widget_caret_and_keyboard(qtbot: Any, design
     conditions, title = (designer.form_row("blocks", "liquids", key) for key in ("conditions", "title"))
     count = len(conditions.field.rows)
     first = conditions.field.rows[0].findChildren(IconButton)
-    press(qtbot, next(one for one in first if "Remove" in one.accessibleName()))
+    press(qtbot, next(button for button in first if "Remove" in button.accessibleName()))
     assert designer.form_row("blocks", "liquids", "conditions") is conditions
     assert len(conditions.field.rows) == count - 1
     assert conditions.isAncestorOf(designer.keyboard)
@@ -117,7 +119,7 @@ def test_the_form_of_the_liquids_adds_a_shipped_one(designer: Any) -> None:
     assert designer.value("liquids", "slime", "non_newtonian", "kind") == "maxwell"
 
 
-def test_the_help_is_that_of_the_row_with_the_keyboard(designer: Any) -> None:
+def test_the_help_shows_the_row_with_the_focus(designer: Any) -> None:
     designer.open("kitchen", "blocks", "liquids")
     for key in ("title", "conditions", "phase", "task"):
         row = designer.form_row("blocks", "liquids", key)
@@ -179,15 +181,17 @@ def test_a_liquid_file_is_chosen_before_a_liquid_changes(designer: Any, monkeypa
     preset.parent.mkdir()
     preset.write_text("format = 2\n[liquids.thin]\ndensity_kg_m3 = 913.5\n", encoding="utf-8", newline="\n")
     answers = iter(["", str(preset)])
-    asked: list[tuple[str, ...]] = []
-    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda _by, *words: (asked.append(words) or next(answers), ""))
+    dialogs: list[tuple[str, ...]] = []
+    monkeypatch.setattr(
+        QFileDialog, "getOpenFileName", lambda _by, *words: (dialogs.append(words) or next(answers), "")
+    )
     designer.open("kitchen", "liquids", "thin")
     before = designer.text
     press_add = designer.place.form.adds["liquids", "thin", "file"].click
     press_add()
     assert designer.text == before, "after Cancel"
     press_add()
-    assert asked == [("Choose a liquid file", str(designer.file.parent), "Protocols (*.toml)")] * 2
+    assert dialogs == [("Choose a liquid file", str(designer.file.parent), "Protocols (*.toml)")] * 2
     assert designer.value("liquids", "thin") == {"file": "presets/thin.toml"}
     assert designer.study.faults == ()
     assert designer.study.protocol.liquids["thin"].density_kg_m3 == 913.5
@@ -254,9 +258,9 @@ def test_add_offers_the_conditions_that_a_block_does_not_have(designer: Any) -> 
     offered = {field.names.itemText(at) for at in range(field.names.count())}
     titles = {title_of(designer.study.document, ("conditions", name)) for name in {*conditions} - {*listed}}
     shipped = {name for name in offered if " liquid, " in name}
-    assert offered - shipped == {*titles, "New condition …"}
+    assert offered - shipped == {*titles, "New condition…"}
     assert any(name.startswith("Honey") for name in shipped)
-    assert (field.names.currentText(), field.names.placeholderText()) == ("", "Add …")
+    assert (field.names.currentText(), field.names.placeholderText()) == ("", "Add…")
 
 
 def test_add_to_the_session_shows_titles(designer: Any) -> None:
@@ -321,11 +325,11 @@ def test_any_language_from_right_to_left_is_typed_so(
     designer.open("kitchen", *row[:-1])
     field = designer.field(*row)
     lines = [*field.findChildren(QLineEdit), *field.findChildren(QPlainTextEdit)]
-    assert {one.layoutDirection() for one in lines} == {Qt.LayoutDirection.RightToLeft}
+    assert {line.layoutDirection() for line in lines} == {Qt.LayoutDirection.RightToLeft}
 
 
 def test_a_field_does_not_move_while_its_row_shrinks(designer: Any) -> None:
-    """When a message disappears, the row and the form are too high until Qt has laid them out."""
+    """After a message disappears, row and form are too high until Qt has laid them out."""
     designer.open("kitchen", "blocks", "liquids")
     (line,) = designer.field("blocks", "liquids", "title").findChildren(QLineEdit)
     for higher in (designer.form_row("blocks", "liquids", "title"), designer.place.form.panel):
@@ -339,9 +343,9 @@ def test_each_trial_design_has_its_own_picture(designer: Any) -> None:
     designer.controller.begin_study("template:two-liquids-abx", "toldapart")
     (block,) = (name for name, facts in designer.study.document["blocks"].items() if "design" in facts)
     designer.go_to("blocks", block)
-    shown = designer.field("blocks", block, "design").list
-    pictures = {shown.itemText(at).partition(" ")[0]: shown.itemIcon(at).pixmap(80, 14).toImage()
-                for at in range(shown.count()) if not shown.itemIcon(at).isNull()}  # fmt: skip
+    designs = designer.field("blocks", block, "design").list
+    pictures = {designs.itemText(at).partition(" ")[0]: designs.itemIcon(at).pixmap(80, 14).toImage()
+                for at in range(designs.count()) if not designs.itemIcon(at).isNull()}  # fmt: skip
     assert {"abx", "2ifc", "3ifc", "4ifc", "oddity", "samedifferent"} <= pictures.keys()
     assert len({bytes(picture.constBits()) for picture in pictures.values()}) == len(pictures)
 
@@ -384,7 +388,7 @@ def test_help_of_two_lines_does_not_move_the_form(designer: Any) -> None:
     assert len(heights) == 1
 
 
-def test_the_help_says_which_key_removes_a_field(designer: Any) -> None:
+def test_the_help_names_the_key_that_removes_a_field(designer: Any) -> None:
     designer.open("kitchen", "study")
     form = designer.place.form
     for key, removable in (("version", True), ("name", False)):
@@ -430,7 +434,7 @@ def test_the_faults_of_a_row_are_below_its_field_and_above_its_repairs(qtbot: An
 
 
 def test_a_text_is_handed_in_at_once_when_its_field_loses_the_keyboard_but_not_by_a_click(designer: Any) -> None:
-    """A click may be on what a step would remove."""
+    """A click may hit a widget that the step would remove."""
     designer.open("kitchen", "conditions", "late")
     line = designer.field("conditions", "late", "delay_ms").findChild(QLineEdit)
     for number, reason in enumerate(Qt.FocusReason, start=137):
@@ -452,10 +456,10 @@ def test_the_texts_of_questions_stand_in_a_column_for_each_language(designer: An
     designer.editing.make_step("Change", Set(ITEMS, changed))
     designer.go_to(*QUESTIONNAIRE)
     places: dict[str, set[tuple[int, int]]] = {"en": set(), "nl": set()}
-    for shown in designer.place.form.findChildren(QLabel):
-        for language, found in places.items():
-            if shown.isVisible() and shown.text() in {text[language] for text in texts}:
-                found.add((shown.mapTo(designer.window, QPoint()).x(), shown.width()))
+    for label in designer.place.form.findChildren(QLabel):
+        for language, positions in places.items():
+            if label.isVisible() and label.text() in {text[language] for text in texts}:
+                positions.add((label.mapTo(designer.window, QPoint()).x(), label.width()))
     assert [len(place) for place in places.values()] == [1, 1], places
 
 
@@ -594,7 +598,7 @@ def test_the_caret_is_at_the_end_of_a_text_that_is_not_or_completely_selected(de
         assert text.is_at_end() == is_at_end, (anchor, caret)
 
 
-def test_a_hypothesis_shows_what_it_compares_and_names_what_is_not_in_the_study(qtbot: Any) -> None:
+def test_a_hypothesis_shows_its_comparison_and_names_missing_elements(qtbot: Any) -> None:
     shared, own = ("like_honey", "Like honey"), ("thickness", "Thickness")
     thin = Compared(key="conditions", block="liquids", name="thin", label="Thin in Liquids", measures=(own, shared))
     thick, warm = (
@@ -605,8 +609,8 @@ def test_a_hypothesis_shows_what_it_compares_and_names_what_is_not_in_the_study(
     qtbot.addWidget(line)
     table = {"blocks": ("liquids",), "conditions": ("thin", "warm"), "measure": "like_honey", "expected": "lower"}
     line.show_value(table, (thin, thick, warm))
-    shown = [box.currentText() for box in (line.measure, line.first, line.relation, line.second)]
-    assert shown == ["Like honey", "Thin in Liquids", "is lower than", "Warm in Liquids"]
+    texts = [box.currentText() for box in (line.measure, line.first, line.relation, line.second)]
+    assert texts == ["Like honey", "Thin in Liquids", "is lower than", "Warm in Liquids"]
     assert line.bound.isHidden()
     line.show_value({**table, "conditions": ("thin", "gone"), "form": "after", "bound": 0.75}, (thin, thick, warm))
     assert (line.first.currentText(), line.second.currentIndex(), line.measure.currentIndex()) == (
@@ -683,6 +687,29 @@ def test_a_chosen_relation_keeps_a_bound_that_fits_it(
         assert line.relation.currentText() == relation
 
 
+@pytest.mark.parametrize(("extent", "bound"), [(6, 0.5), (100, 5)])
+def test_a_new_equality_on_a_wide_scale_has_a_bound_of_5_percent(qtbot: Any, extent: float, bound: float) -> None:
+    late, prompt = (
+        Compared(key="blocks", block=name, name=name, label=name, measures=(("load/raw", "Raw score"),),
+                 ranges={"load/raw": extent})
+        for name in ("late", "prompt")
+    )  # fmt: skip
+    line, tables = Hypothesis("Hypothesis 1"), list[dict[str, Any]]()
+    qtbot.addWidget(line)
+    line.changed.connect(tables.append)
+    line.show_value({"measure": "raw", "form": "load", "blocks": ("late", "prompt")}, (late, prompt))
+    line.relation.setCurrentText("is equal to")
+    line.relation.activated.emit(line.relation.currentIndex())
+    assert tables[0]["bound"] == bound
+
+
+def test_the_ranges_of_questions_and_scores_are_those_of_their_scales() -> None:
+    protocol = parse(text_of("mixed").encode(), "mixed.toml")
+    after = protocol.questionnaires["after"].ranges(protocol.scales, "en")
+    assert after == {"feels_liquid": 6, "thickness": 4, "pleasant": 100}
+    assert protocol.questionnaires["load"].ranges(protocol.scales, "en")["raw"] == pytest.approx(100)
+
+
 @pytest.mark.parametrize(
     ("measure", "bound"), {"threshold": 1.25, "pse": 1.25, "d_prime": 0.5, "exponent": 0.5}.items()
 )
@@ -726,9 +753,9 @@ def test_each_language_is_copied_and_removed_by_its_own_buttons(designer: Any) -
     for code in ("fr", "nl"):
         designer.editing.handle_request(ChangeLanguage("add", code))
     designer.go_to("study")
-    field, asked = designer.field("study", "languages"), list[Any]()
+    field, requests = designer.field("study", "languages"), list[Any]()
     field.asked.disconnect()
-    field.asked.connect(asked.append)
+    field.asked.connect(requests.append)
     languages = {"en": "English", "fr": "French", "nl": "Dutch"}
     names = [[button.accessibleName() for button in row.findChildren(QAbstractButton)] for row in field.rows]
     removals = [f"Remove {language} from every text" for language in languages.values()]
@@ -746,19 +773,19 @@ def test_each_language_is_copied_and_removed_by_its_own_buttons(designer: Any) -
         (ChangeLanguage("remove", code) for code in languages),
         (ChangeLanguage("copy", code) for code in ("fr", "nl")),
     )
-    assert asked == [*removed, *copied]
+    assert requests == [*removed, *copied]
     offered = [field.names.itemData(index) for index in range(field.names.count())]
     assert offered
     assert not {*offered} & {*languages}
     field.names.activated.emit(len(offered) - 1)
-    assert asked[-1] == ChangeLanguage("add", offered[-1])
+    assert requests[-1] == ChangeLanguage("add", offered[-1])
 
 
-def test_an_answer_on_the_page_of_a_new_study_that_is_no_number_is_refused_with_its_question(qtbot: Any) -> None:
-    asked = {"text": "Trials", "unit": "", "bounds": "at least 1"}
-    trials = TemplateQuestion(path=("methods", "adaptive", "trials"), value="40", **asked)
+def test_a_new_study_refuses_an_answer_that_is_not_a_number_and_names_its_question(qtbot: Any) -> None:
+    shared_values = {"text": "Trials", "unit": "", "bounds": "at least 1"}
+    trials = TemplateQuestion(path=("methods", "adaptive", "trials"), value="40", **shared_values)
     standards = TemplateQuestion(path=("stimuli", "damping", "standards"), value="4, 8", several=True,
-                                 **{**asked, "text": "Standards"})  # fmt: skip
+                                 **{**shared_values, "text": "Standards"})  # fmt: skip
     choice = replace(template_choice("empty", template("empty")), languages=("nl",), questions=(trials, standards))
     questions = Questions()
     qtbot.addWidget(questions)

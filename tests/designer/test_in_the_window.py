@@ -92,7 +92,7 @@ def test_a_kill_while_typing_loses_at_most_the_last_second(designer: Any, tmp_pa
         assert designer.file.read_bytes() == before
 
 
-def test_a_pressed_segment_stays_chosen_and_shows_what_it_says(designer: Any) -> None:
+def test_a_pressed_segment_stays_chosen_and_shows_its_page(designer: Any) -> None:
     designer.open("kitchen", "blocks", "liquids")
     place, preview = designer.place, designer.controller.preview
     shows = {

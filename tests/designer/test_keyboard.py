@@ -1,4 +1,4 @@
-"""The keyboard in the designer: every key, Tab through the place as it is seen, fields that are typed in."""
+"""The keyboard in the designer: every key, the Tab order, and fields during typing."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,14 +17,14 @@ from study_app.gui.widgets.controls import ActionButton
 pytestmark = pytest.mark.slow
 
 
-def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:
-    made = [keys.toString() for action in designer.place.actions() for keys in action.shortcuts()]
-    made.append(designer.place.header.play.play.shortcut().toString())
-    wanted = [keys for one in COMMANDS if not one.within for keys in one.keys]
-    assert sorted({"Ins": "Insert"}.get(keys, keys) for keys in made) == sorted(wanted)
+def test_every_key_of_the_designer_belongs_to_exactly_one_shortcut(designer: Any) -> None:
+    actual = [keys.toString() for action in designer.place.actions() for keys in action.shortcuts()]
+    actual.append(designer.place.header.play.play.shortcut().toString())
+    expected = [keys for command in COMMANDS if not command.within for keys in command.keys]
+    assert sorted({"Ins": "Insert"}.get(keys, keys) for keys in actual) == sorted(expected)
 
 
-CAPS = {"Add": "Ins", "Duplicate": "Ctrl D", "Outline": "Ctrl 1", "Next": "F8", "New study …": "Ctrl N",
+CAPS = {"Add": "Ins", "Duplicate": "Ctrl D", "Outline": "Ctrl 1", "Next": "F8", "New study…": "Ctrl N",
         "Make study": "Enter", "Play from here": "F5"}  # fmt: skip
 
 
@@ -34,7 +34,7 @@ def test_each_button_shows_the_key_that_does_the_same(designer: Any) -> None:
     assert {button.text(): button.cap for button in buttons if button.cap} == CAPS
 
 
-def test_a_tab_that_is_asked_for_comes_to_the_front_in_a_narrow_window(designer: Any) -> None:
+def test_a_requested_tab_comes_to_the_front_in_a_narrow_window(designer: Any) -> None:
     designer.open(width=1024)
     designer.place.parts.show_tab("file")
     assert designer.place.pane.isVisible()
@@ -79,7 +79,7 @@ MOST = 250
 
 @pytest.fixture
 def dutch(qtbot: Any, designer: Any) -> Any:
-    """The study in two languages, with a block selected."""
+    """Return the designer with a study in two languages and a selected block."""
     designer.open()
     for how in ("add", "copy"):
         designer.editing.handle_request(ChangeLanguage(how, "nl"))
@@ -88,13 +88,13 @@ def dutch(qtbot: Any, designer: Any) -> Any:
     return designer
 
 
-def passed(designer: Any, until: Callable[[QWidget], bool]) -> list[Any]:
-    """Press Tab until the keyboard is at a part; return all that it was at."""
-    seen = [designer.keyboard]
-    while not until(seen[-1]):
-        assert len(seen) < MOST, [one.accessibleName() for one in seen[-40:]]
-        seen.append(designer.hit("Tab"))
-    return seen
+def stops_until(designer: Any, until: Callable[[QWidget], bool]) -> list[Any]:
+    """Press Tab until a widget that fulfils ``until`` has the focus; return every focused widget."""
+    stops = [designer.keyboard]
+    while not until(stops[-1]):
+        assert len(stops) < MOST, [stop.accessibleName() for stop in stops[-40:]]
+        stops.append(designer.hit("Tab"))
+    return stops
 
 
 @pytest.mark.variants(4)
@@ -108,8 +108,8 @@ def test_tab_goes_to_each_stop_of_a_form_once(dutch: Any, editors: None, path: t
     assert form.rows
     QApplication.processEvents()
     dutch.place.parts.focus_header()
-    seen = passed(dutch, lambda part: part is dutch.place.pane.tabs.buttons[0])
-    assert [part.accessibleName() for part in seen if form.inside.isAncestorOf(part)] == [
+    stops = stops_until(dutch, lambda part: part is dutch.place.pane.tabs.buttons[0])
+    assert [part.accessibleName() for part in stops if form.inside.isAncestorOf(part)] == [
         part.accessibleName() for part in focus_stops(form.inside) if part.isVisible() and part.isEnabled()
     ]
 
@@ -204,8 +204,10 @@ def test_groups_are_added_in_twos_which_the_entry_and_the_foot_say(designer: Any
 def test_a_shipped_liquid_is_chosen_without_leaving_the_form(designer: Any, path: tuple[str, ...]) -> None:
     designer.controller.begin_study("template:two-liquids-abx", "mine")
     designer.go_to(*path[:2])
-    asked = next(asked for words, asked in designer.form_row(*path).row.additions if words.startswith("Slime liquid"))
-    designer.place.form.asked.emit(asked)
+    request = next(
+        request for words, request in designer.form_row(*path).row.additions if words.startswith("Slime liquid")
+    )
+    designer.place.form.asked.emit(request)
     assert designer.editing.selected == path[:2]
     named = designer.value(*path)
     assert named == "slime" if path[0] == "conditions" else named[-1] == "slime"
@@ -263,10 +265,10 @@ def test_arrow_keys_change_the_last_digit_of_a_number_and_the_chosen_segment(des
     designer.place.show_tab("measures")
     tabs = designer.place.pane.tabs
     names = [page.name for page in designer.place.pane.pages]
-    shown = []
+    tabs_shown = []
     for name, keys in ((names[1], "Right"), (names[1], "Left"), (names[-1], "Right"), (names[0], "Left")):
         designer.place.show_tab(name)
         tabs.buttons[names.index(name)].setFocus()
         designer.hit(keys)
-        shown.append(designer.place.pane.tab)
-    assert shown == [names[2], names[0], names[-1], names[0]]
+        tabs_shown.append(designer.place.pane.tab)
+    assert tabs_shown == [names[2], names[0], names[-1], names[0]]

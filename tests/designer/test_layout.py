@@ -32,7 +32,7 @@ SIZES = pytest.mark.parametrize("size", [(1024, 640), (1366, 768), (1600, 1000)]
 
 
 class Shown(QObject):
-    """Notes every window that is shown."""
+    """An event filter that records every shown window."""
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
@@ -47,7 +47,7 @@ class Shown(QObject):
 
 @pytest.fixture
 def windows(designer: Any) -> Iterator[list[str]]:
-    """The windows that are shown during a test."""
+    """Return the windows that are shown during a test."""
     watch = Shown(designer.window)
     QApplication.instance().installEventFilter(watch)
     yield watch.windows
@@ -59,7 +59,7 @@ def fits(area: Any) -> bool:
 
 
 def nameless(place: Any) -> list[QWidget]:
-    """Return the parts shown that take the keyboard and have no name; a list has parts of its own."""
+    """Return the visible widgets that take the keyboard but have no name, except the inner widgets of lists."""
     own = [part for part in place.findChildren(QWidget) if isinstance(part, TAKE_KEYS) and part.isVisible()]
     within = {inner for part in own if isinstance(part, QComboBox) for inner in part.findChildren(QWidget)}
     takes_keys = [part for part in own if part not in within and part.focusPolicy() != Qt.FocusPolicy.NoFocus]
@@ -67,15 +67,17 @@ def nameless(place: Any) -> list[QWidget]:
 
 
 def cut(place: Any) -> list[str]:
-    """Return the words shown in chips, empty fields and wrapped labels for which there is too little room."""
-    chips = [one for one in place.form.findChildren(Chip) if one.isVisible() and one.width() < one.sizeHint().width()]
-    lines = [one for one in place.form.inside.findChildren(QLineEdit) if one.isVisible() and not one.text()]
-    room = [one.width() - one.fontMetrics().horizontalAdvance(one.placeholderText()) for one in lines]
-    wrapped = [one for one in place.form.inside.findChildren(QLabel) if one.isVisible() and one.wordWrap()]
+    """Return the texts of chips, empty fields and wrapped labels that are cut off."""
+    chips = [
+        chip for chip in place.form.findChildren(Chip) if chip.isVisible() and chip.width() < chip.sizeHint().width()
+    ]
+    lines = [line for line in place.form.inside.findChildren(QLineEdit) if line.isVisible() and not line.text()]
+    room = [line.width() - line.fontMetrics().horizontalAdvance(line.placeholderText()) for line in lines]
+    wrapped = [label for label in place.form.inside.findChildren(QLabel) if label.isVisible() and label.wordWrap()]
     return [
-        *(one.word for one in chips),
-        *(one.placeholderText() for one, left in zip(lines, room, strict=True) if left < 0),
-        *(one.text() for one in wrapped if one.height() < one.heightForWidth(one.width())),
+        *(chip.word for chip in chips),
+        *(line.placeholderText() for line, width in zip(lines, room, strict=True) if width < 0),
+        *(label.text() for label in wrapped if label.height() < label.heightForWidth(label.width())),
     ]
 
 
@@ -112,7 +114,7 @@ def test_every_form_and_view_fits_and_has_names(
 
 @SIZES
 def test_a_block_without_a_design_fits(designer: Any, editors: None, size: tuple[int, int]) -> None:
-    """It offers the keys with the longest names; a form that does not fit is cut on the left."""
+    """Such a block offers the keys with the longest names; a form that does not fit is cut off on the left."""
     designer.window.resize(*size)
     designer.controller.begin_study("template:empty", "mine")
     designer.go_to("blocks", "liquids")
@@ -128,12 +130,12 @@ def test_measures_and_the_page_of_a_new_study_fit(
     designer.window.resize(*size)
     designer.controller.show_new_page()
     page = designer.place.new_page
-    for one in page.buttons:
-        one.setChecked(True)
+    for button in page.buttons:
+        button.setChecked(True)
         qtbot.wait(1)
-        assert fits(page.card.area), one.choice.source
+        assert fits(page.card.area), button.choice.source
         assert page.card.questions.title.width() == page.card.questions.width(), "a title is long"
-        assert not nameless(page), one.choice.source
+        assert not nameless(page), button.choice.source
     designer.controller.begin_study("template:viscosity-jnd", "thicker")
     designer.place.sides.buttons[1].click()
     designer.place.pane.show_tab("measures")

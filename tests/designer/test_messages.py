@@ -24,20 +24,20 @@ def edit(designer: Any, *edits: Any) -> None:
 
 
 def test_a_block_is_opened_in_the_lab_as_its_first_and_second_liquid(designer: Any) -> None:
-    opened: list[Any] = []
+    requests: list[Any] = []
     feeling = designer.controller.feeling
-    feeling.asked.connect(opened.append)
+    feeling.asked.connect(requests.append)
     designer.open()
     edit(designer, Set(("blocks", "liquids", "conditions"), ["thick", "thin"]))
     for path in (("blocks", "liquids"), ("conditions", "late"), THICK):
         feeling.feel_liquids(path)
-    settings = [(liquids.a.name, liquids.b.name, liquids.study) for liquids in opened]
+    settings = [(liquids.a.name, liquids.b.name, liquids.study) for liquids in requests]
     assert settings == [("Thick", "Thin", "kitchen"), ("Thin", "Thin", "kitchen"), ("Thick", "Thick", "kitchen")]
-    densities = [setting.scene.liquids[0].density_kg_m3 for setting in (opened[0].a, opened[0].b)]
+    densities = [setting.scene.liquids[0].density_kg_m3 for setting in (requests[0].a, requests[0].b)]
     assert densities == [designer.value(*path, "density_kg_m3") for path in (THICK, THIN)]
     designer.open("demo")
     feeling.feel_liquids(THIN)
-    assert opened[-1].study == "", "a study that ships cannot be changed"
+    assert requests[-1].study == "", "a study that ships cannot be changed"
     assert designer.messages == []
 
 
@@ -110,22 +110,22 @@ def test_settings_of_the_whole_study_are_named_when_a_liquid_is_put_back(designe
     ]
 
 
-def test_each_entry_of_the_list_of_studies_opens_what_it_names(designer: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_entry_of_the_list_of_studies_opens_its_study(designer: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     designer.open()
-    header, asked = designer.place.header, list[tuple[str, str]]()
+    header, requests = designer.place.header, list[tuple[str, str]]()
     header.study_asked.disconnect()
     header.new_asked.disconnect()
-    header.study_asked.connect(lambda source: asked.append(("open", source)))
-    header.new_asked.connect(lambda: asked.append(("new", "")))
+    header.study_asked.connect(lambda source: requests.append(("open", source)))
+    header.new_asked.connect(lambda: requests.append(("new", "")))
     monkeypatch.setattr("study_app.designer.header.choose_protocol", lambda _by, title: f"{title}/other.toml")
-    shown = header.study.currentIndex()
-    assert [header.study.findText(text) for text in ("New study …", "Open file …")] == [
+    current = header.study.currentIndex()
+    assert [header.study.findText(text) for text in ("New study…", "Open file…")] == [
         header.study.findData(NEW), header.study.findData(OPEN)
     ]  # fmt: skip
     for source in (NEW, OPEN, "demo", "kitchen"):
         header.study.activated.emit(header.study.findData(source))
-        assert header.study.currentIndex() == shown, "until another study is open"
-    assert asked == [("new", ""), ("open", "Open study/other.toml"), ("open", "demo")]
+        assert header.study.currentIndex() == current, "until another study is open"
+    assert requests == [("new", ""), ("open", "Open study/other.toml"), ("open", "demo")]
 
 
 def test_edits_in_another_window_are_kept_as_a_version_and_can_be_compared(designer: Any) -> None:
@@ -153,7 +153,7 @@ def test_edits_in_another_window_are_kept_as_a_version_and_can_be_compared(desig
 def test_make_a_copy_of_a_read_only_study_chooses_it_on_the_page_of_a_new_study(designer: Any) -> None:
     designer.open("demo")
     banner = designer.place.banner
-    assert [(action, button.text()) for action, button in banner.buttons.items()] == [("copy", "Make a copy …")]
+    assert [(action, button.text()) for action, button in banner.buttons.items()] == [("copy", "Make a copy…")]
     banner.buttons["copy"].click()
     assert designer.place.stack.currentWidget() is designer.place.new_page
     (chosen,) = [button.choice.source for button in designer.place.new_page.buttons if button.isChecked()]
@@ -161,9 +161,9 @@ def test_make_a_copy_of_a_read_only_study_chooses_it_on_the_page_of_a_new_study(
 
 
 def test_a_click_in_the_strip_of_a_session_opens_the_step_below_it(qtbot: Any) -> None:
-    opened: list[Any] = []
+    paths: list[Any] = []
     shares = {("pages", "welcome"): 0.2, ("blocks", "liquids"): 0.5, ("blocks", "delays"): 0.3}
-    strip = _Strip(tuple(Segment(path[1], share, False, path) for path, share in shares.items()), opened.append)
+    strip = _Strip(tuple(Segment(path[1], share, False, path) for path, share in shares.items()), paths.append)
     qtbot.addWidget(strip)
     strip.resize(400, 14)
     strip.show()
@@ -174,4 +174,4 @@ def test_a_click_in_the_strip_of_a_session_opens_the_step_below_it(qtbot: Any) -
             strip, Qt.MouseButton.LeftButton, pos=strip.rect().topLeft() + type(strip.rect().topLeft())(x, 7)
         )
     QTest.mouseClick(strip, Qt.MouseButton.RightButton)
-    assert opened == [path for path in shares for _ in range(2)]
+    assert paths == [path for path in shares for _ in range(2)]

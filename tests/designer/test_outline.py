@@ -29,7 +29,7 @@ LEFT = Qt.MouseButton.LeftButton
 def place_of(designer: Any, *path: str | int) -> QPoint:
     """Return the middle of an element's first row."""
     outline = designer.place.outline
-    index = next(one for one in outline.indexes() if one.data(ROW_ROLE).path == path)
+    index = next(row for row in outline.indexes() if row.data(ROW_ROLE).path == path)
     outline.tree.scrollTo(index)
     return outline.tree.visualRect(index).center()
 
@@ -84,19 +84,19 @@ def test_the_outline_follows_a_selection_made_elsewhere_and_leads_on(designer: A
 
 def test_enter_at_a_field_that_was_found_leads_to_it_and_ends_the_search(designer: Any, qtbot: Any) -> None:
     designer.open()
-    outline, asked = designer.place.outline, list[Any]()
-    outline.field_asked.connect(asked.append)
-    outline.form_asked.connect(lambda: asked.append("form"))
+    outline, requests = designer.place.outline, list[Any]()
+    outline.field_asked.connect(requests.append)
+    outline.form_asked.connect(lambda: requests.append("form"))
     for words, path, answer in (
         ("dwell", ("tasks", "reach"), ("tasks", "reach", "dwell_s")),
         ("", ("device",), "form"),
     ):
         outline.search_field.setText(words)
-        qtbot.waitUntil(lambda path=path: any(one.data(ROW_ROLE).path == path for one in outline.indexes()))
+        qtbot.waitUntil(lambda path=path: any(row.data(ROW_ROLE).path == path for row in outline.indexes()))
         outline.tree.setCurrentIndex(designer.index(*path))
         assert bool(outline.tree.currentIndex().data(ROW_ROLE).field) is bool(words)
         qtbot.keyClick(outline.tree, Qt.Key.Key_Return)
-        assert (asked.pop(), asked, outline.search_field.text()) == (answer, [], "")
+        assert (requests.pop(), requests, outline.search_field.text()) == (answer, [], "")
 
 
 def test_the_outline_scrolls_towards_the_edge_that_a_row_is_dragged_to(qtbot: Any, designer: Any) -> None:
@@ -204,7 +204,7 @@ def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, des
     assert designer.place.view.form.path == ("conditions", "honey")
 
 
-def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_typed(qtbot: Any, designer: Any) -> None:
+def test_a_field_clicked_three_times_after_typing_an_id_accepts_typing(qtbot: Any, designer: Any) -> None:
     designer.open()
     type_id(qtbot, designer, ("liquids", "thick"), "honey")
     (density,) = designer.form_row("liquids", "thick", "density_kg_m3").findChildren(QLineEdit)
@@ -217,12 +217,12 @@ def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_type
     assert density.selectedText() == density.text()
     qtbot.keyClicks(density, "1402")
     qtbot.waitUntil(lambda: "density_kg_m3 = 1402" in designer.text)
-    qtbot.mouseClick(next(one for one in designer.place.form.adds.values() if one.isVisible()), LEFT)
+    qtbot.mouseClick(next(button for button in designer.place.form.adds.values() if button.isVisible()), LEFT)
     assert designer.value("liquids", "honey", "density_kg_m3") == 1402
     assert "thick" not in designer.value("liquids")
 
 
-def listed(designer: Any) -> list[str]:
+def study_titles(designer: Any) -> list[str]:
     box = designer.place.header.study
     return [box.itemText(at) for at in range(box.count())]
 
@@ -230,8 +230,8 @@ def listed(designer: Any) -> list[str]:
 def add_study(designer: Any, name: str, title: str) -> None:
     text = designer.file.read_text("utf-8")
     before = next(line for line in text.splitlines() if line.startswith("title = "))
-    made = text.replace('name = "kitchen"', f'name = "{name}"').replace(before, f'title = "{title}"', 1)
-    (designer.file.parent / f"{name}.toml").write_text(made, encoding="utf-8", newline="\n")
+    content = text.replace('name = "kitchen"', f'name = "{name}"').replace(before, f'title = "{title}"', 1)
+    (designer.file.parent / f"{name}.toml").write_text(content, encoding="utf-8", newline="\n")
 
 
 def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(designer: Any) -> None:
@@ -239,21 +239,21 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
         add_study(designer, name, title)
     keep_original(designer.file.with_name("beta.toml"), "alpha")
     designer.open()
-    own = [words for words in listed(designer) if "(shipped)" not in words][:-2]
+    own = [words for words in study_titles(designer) if "(shipped)" not in words][:-2]
     assert own[:2] == ["A first look  ·  kitchen.toml", "apples  ·  zeta.toml"]
     assert [words for words in own if words.startswith("Melons")] == [
         "Melons  ·  alpha.toml",
         "Melons  ·  beta.toml  (copy of alpha)",
     ]
     assert own == sorted(own, key=str.casefold)
-    shipped_ones = [words for words in listed(designer) if "(shipped)" in words]
+    shipped_ones = [words for words in study_titles(designer) if "(shipped)" in words]
     assert len(shipped_ones) == len(shipped())
-    assert listed(designer)[len(own) : len(own) + len(shipped_ones)] == sorted(shipped_ones, key=str.casefold)
-    before = listed(designer)
+    assert study_titles(designer)[len(own) : len(own) + len(shipped_ones)] == sorted(shipped_ones, key=str.casefold)
+    before = study_titles(designer)
     designer.open("beta")
     designer.place.ask("save")
     designer.controller.enter()
-    assert listed(designer) == before
+    assert study_titles(designer) == before
     file = designer.file.with_name("zeta.toml")
     kept = Keeper(file, base=content_hash(file.read_bytes()))
     kept.note_edit(file.read_text("utf-8").replace("apples", "pears"), (), 0.0)
@@ -269,7 +269,7 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
 
 @pytest.fixture
 def small(designer: Any) -> Any:
-    """A study of many elements in a small window."""
+    """Return the designer with a study of many elements in a small window."""
     designer.window.resize(1366, 768)
     designer.controller.begin_study("rek2024", "mine")
     QApplication.processEvents()
@@ -282,15 +282,15 @@ def open_drawer(qtbot: Any, designer: Any) -> None:
 
 
 def index_of(designer: Any, *path: str | int) -> Any:
-    return next(one for one in designer.place.outline.indexes() if one.data(ROW_ROLE).path == path)
+    return next(index for index in designer.place.outline.indexes() if index.data(ROW_ROLE).path == path)
 
 
-def expanded(designer: Any) -> set[Any]:
+def expanded_rows(designer: Any) -> set[Any]:
     tree = designer.place.outline.tree
-    return {one.data(ROW_ROLE).path for one in designer.place.outline.indexes() if tree.isExpanded(one)}
+    return {index.data(ROW_ROLE).path for index in designer.place.outline.indexes() if tree.isExpanded(index)}
 
 
-def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: Any, small: Any) -> None:
+def test_a_click_in_the_drawer_leads_to_the_form_and_keeps_rows_expanded(qtbot: Any, small: Any) -> None:
     outline, tree = small.place.outline, small.place.outline.tree
     small.editing.select(("blocks", "liquids"))
     small.click_on(small.place.parts.path.outline)
@@ -298,19 +298,19 @@ def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: 
     for _ in range(2):
         open_drawer(qtbot, small)
         index = index_of(small, "blocks", "liquids")
-        before = expanded(small)
+        before = expanded_rows(small)
         assert ("blocks", "liquids") in before
         tree.scrollTo(index)
         qtbot.mouseClick(tree.viewport(), LEFT, pos=tree.visualRect(index).center())
         assert not outline.isVisible()
         assert small.place.form.isAncestorOf(small.keyboard)
-        assert expanded(small) == before
+        assert expanded_rows(small) == before
     open_drawer(qtbot, small)
     index = index_of(small, "blocks", "liquids")
     tree.scrollTo(index)
     qtbot.mouseClick(tree.viewport(), LEFT, pos=QPoint(20, tree.visualRect(index).center().y()))
     assert outline.isVisible(), "the sign before the title opens and closes, it does not choose"
-    assert ("blocks", "liquids") not in expanded(small)
+    assert ("blocks", "liquids") not in expanded_rows(small)
 
 
 def test_escape_in_the_drawer_returns_the_keyboard_to_the_field(qtbot: Any, small: Any) -> None:

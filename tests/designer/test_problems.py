@@ -40,8 +40,8 @@ def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer:
         qtbot.waitUntil(lambda number=number: len(problems.problems) == len(lines) - number)
         assert before.identity not in {row.identity for row in problems.problems}
         assert tuple(problems.lines) == lines
-        assert [one.isEnabled() for one in lines] == [False] * number + [True] * (len(lines) - number)
-        assert [one.row for one in lines[number:]] == list(problems.problems)
+        assert [line.isEnabled() for line in lines] == [False] * number + [True] * (len(lines) - number)
+        assert [line.row for line in lines[number:]] == list(problems.problems)
     assert designer.study.faults == ()
 
 
@@ -94,14 +94,14 @@ def test_header_and_list_count_problems_and_warnings_after_each_step(designer: A
     assert [line.here for line in problems.lines] == marks, "also in lines that are made anew"
     (line,) = [line.row.line for line in problems.lines if line.here]
     designer.editing.handle_request(RetypeFile(f"# a new line\n# and another\n{designer.study.text}"))
-    qtbot.waitUntil(lambda: [line + 2] == [shown.row.line for shown in problems.lines if shown.here])
+    qtbot.waitUntil(lambda: [line + 2] == [shown_line.row.line for shown_line in problems.lines if shown_line.here])
     for _ in range(4):
         designer.editing.undo()
     qtbot.waitUntil(lambda: header.chip_text == sound)
     assert heading.text() == "No problems"
 
 
-def test_a_repeated_text_is_a_problem_of_its_language_alone(designer: Any) -> None:
+def test_a_repeated_text_is_a_problem_only_in_its_language(designer: Any) -> None:
     first, copy = ("questionnaires", "liquid", "items", 0), ("questionnaires", "liquid", "items", 1)
     designer.open()
     original = designer.value(*first)

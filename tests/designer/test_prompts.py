@@ -1,4 +1,4 @@
-"""Cards that ask before a step, and lines with buttons: each button asks for what it says."""
+"""Confirmation cards and lines with buttons: each button sends its request."""
 
 from typing import Any
 
@@ -90,9 +90,9 @@ def test_a_confirmation_answers_its_action_and_escape_gives_up(qtbot: Any) -> No
 
 @pytest.mark.parametrize("closes", [True, False])
 def test_each_button_of_a_notice_asks_for_its_own_action(qtbot: Any, closes: bool) -> None:
-    card, asked = NoticeCard(of_playing=False), list[str]()
+    card, actions = NoticeCard(of_playing=False), list[str]()
     qtbot.addWidget(card)
-    card.asked.connect(asked.append)
+    card.asked.connect(actions.append)
     card.show_notice(
         Notice("Changed", (("keep", "Keep mine"), ("take", "Use the file's")), listed=("a",), closes=closes)
     )
@@ -105,7 +105,7 @@ def test_each_button_of_a_notice_asks_for_its_own_action(qtbot: Any, closes: boo
         card.buttons[action].click()
     assert card.close_button.isHidden() == (not closes)
     assert card.close_by_key() == closes
-    assert asked == ["take", "keep"] + ["close"] * closes
+    assert actions == ["take", "keep"] + ["close"] * closes
     card.show_notice(None)
     assert card.isHidden()
 
@@ -127,14 +127,14 @@ def test_problems_and_warnings_have_their_own_signs_and_can_be_limited_to_an_ele
     card.show_problems(problems, LIQUID)
     card.show_warnings(warned)
     assert card.heading.text() == "2 problems, 1 warning"
-    shown = {}
+    elements = {}
     for element in (LIQUID, ("blocks", "delays"), ("device",)):
         card.show_problems(problems, element)
         for here_only in (False, True):
             card.limit.buttons[here_only].click()
-            shown[element[-1], card.limit.buttons[here_only].text()] = [line.row.element for line in card.lines]
+            elements[element[-1], card.limit.buttons[here_only].text()] = [line.row.element for line in card.lines]
     everything = [LIQUID, BLOCK, ("blocks", "delays")]
-    assert shown == {
+    assert elements == {
         ("thin", "All"): everything,
         ("thin", "Here only"): [LIQUID],
         ("delays", "All"): everything,

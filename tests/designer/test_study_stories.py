@@ -16,11 +16,13 @@ pytestmark = pytest.mark.slow
 
 
 def new_study(story: Story) -> None:
-    """A study begins with the answers, as a copy, or under a name that is free; Tab and arrows go through the page."""
+    """A new study has the answers, is a copy, or gets a free name; Tab and arrow keys move through the page."""
     designer, page = story.designer, story.designer.place.new_page
     ask, questions = designer.controller.show_new_page, page.card.questions
     story.act("ask", ask)
-    story.act("adaptive", next(one for one in page.buttons if one.choice.source == "template:viscosity-jnd").click)
+    story.act(
+        "adaptive", next(button for button in page.buttons if button.choice.source == "template:viscosity-jnd").click
+    )
     assert [chip.word for chip in page.card.details.findChildren(Chip)] == ["recovered"]
     languages = [f"Language {name}" for name in ("English", "Dutch", "German", "French", "Arabic")]
     for at in ("Short name of the new study", *languages, "Standards", "Trials per standard"):
@@ -56,9 +58,9 @@ def new_study(story: Story) -> None:
     story.play("'Cold tea'")
     assert page.name.placeholderText().startswith("cold")
     story.act("of the demo", lambda: ask("demo"))
-    reached_by_tab = [one.focusPolicy() == Qt.FocusPolicy.StrongFocus for one in page.buttons]
-    assert reached_by_tab == [one.isChecked() for one in page.buttons]
-    story.act("to the chosen card", next(one for one in page.buttons if one.isChecked()).setFocus)
+    reached_by_tab = [button.focusPolicy() == Qt.FocusPolicy.StrongFocus for button in page.buttons]
+    assert reached_by_tab == [button.isChecked() for button in page.buttons]
+    story.act("to the chosen card", next(button for button in page.buttons if button.isChecked()).setFocus)
     story.expect(at="Copy of A first look")
     story.play("Up Up Up")
     story.expect(at="Template Compare liquids")
@@ -85,7 +87,7 @@ def hypotheses(story: Story) -> None:
         assert designer.value(*contrasts) == (hypothesis | more,)
 
     def offered(*compared: str) -> None:
-        """Check which second items are offered for the first one."""
+        """Check the second items that are offered for the first one."""
         assert [line().second.itemText(at) for at in range(line().second.count())] == [*compared]
 
     story.press("Add a hypothesis")
@@ -186,7 +188,9 @@ def two_conditions(story: Story) -> None:
     story.act("balanced", designer.field("study", "block_order").segments.buttons[1].click)
     story.press("Add a hypothesis")
     story.play("Insert 'nasa' Return")
-    story.act("ask", next(one for one in head.asks.actions() if one.text().startswith("After each block")).trigger)
+    story.act(
+        "ask", next(action for action in head.asks.actions() if action.text().startswith("After each block")).trigger
+    )
     assert designer.study.faults == ()
     assert designer.study.protocol.study.block_order == "balanced"
     story.play("@sequence")
@@ -197,5 +201,7 @@ def two_conditions(story: Story) -> None:
 
 
 @pytest.mark.parametrize("tell", [new_study, hypotheses, two_conditions])
-def test_each_act_changes_what_it_should(tell_story: Callable[..., None], tell: Callable[[Story], None]) -> None:
+def test_each_act_of_a_story_leaves_the_window_consistent(
+    tell_story: Callable[..., None], tell: Callable[[Story], None]
+) -> None:
     tell_story(tell)

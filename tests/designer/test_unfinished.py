@@ -1,4 +1,4 @@
-"""Entries that are being added: their problems are hints until they are left, and a deletion says how to undo it."""
+"""New entries: their problems are hints until the entry is left, and a deletion explains how to undo it."""
 
 from collections.abc import Callable
 from typing import Any
@@ -38,8 +38,8 @@ def begin(designer: Any, template: str = "two-liquids-abx") -> None:
     assert designer.study.faults == ()
 
 
-def shown(designer: Any) -> int:
-    """The number of problems that the list, the chip, the outline and the form agree on."""
+def problem_count(designer: Any) -> int:
+    """Return the number of problems; check that list, chip, outline and form agree on it."""
     QApplication.processEvents()
     designer.controller.show_outline()
     count = len(designer.place.problems.problems)
@@ -66,23 +66,23 @@ def every_problem(designer: Any) -> int:
     ],
 )
 def test_the_problems_of_an_entry_are_shown_when_it_is_left(designer: Any, template: str, incomplete: set[str]) -> None:
-    """Whatever *Add* and *Duplicate* offer adds no problem before it is left."""
+    """Nothing that *Add* and *Duplicate* offer adds a problem before it is left."""
     begin(designer, template)
     elements = [row.path for part in ("session", "parts") for row in getattr(outline(designer.study), part)]
     elements = [path for path in dict.fromkeys(elements) if len(path) > 1]
-    asked = {entry.asks: ("study",) for entry in addable_elements(designer.study, ("study",))}
+    requests = {entry.asks: ("study",) for entry in addable_elements(designer.study, ("study",))}
     for path in elements:
-        asked |= {entry.asks: path for entry in addable_elements(designer.study, path) if entry.asks not in asked}
+        requests |= {entry.asks: path for entry in addable_elements(designer.study, path) if entry.asks not in requests}
     had = set()
-    for request, selected in [*asked.items(), *((DuplicateElement(path), path) for path in elements)]:
+    for request, selected in [*requests.items(), *((DuplicateElement(path), path) for path in elements)]:
         designer.go_to(*selected)
         designer.place.parts.focus_form()
         designer.editing.handle_request(request)
-        assert shown(designer) == 0, request
+        assert problem_count(designer) == 0, request
         if every_problem(designer):
             had.add(designer.steps[-1])
         designer.place.parts.show_tab("file")
-        assert shown(designer) == every_problem(designer), request
+        assert problem_count(designer) == every_problem(designer), request
         designer.undo_all()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     assert incomplete <= had, had
@@ -93,7 +93,7 @@ def duplicate_question(designer: Any) -> None:
     designer.go_to(*QUESTION)
     designer.editing.handle_request(DuplicateElement(QUESTION))
     assert designer.editing.selected == COPY
-    assert shown(designer) == 0
+    assert problem_count(designer) == 0
 
 
 LEAVING: dict[str, Callable[[Any], object]] = {
@@ -113,7 +113,7 @@ def test_each_way_to_leave_a_copy_shows_that_it_reads_the_same(designer: Any, wa
     said, role = row.fault_line.sentence.text(), row.fault_line.sentence.property("role")
     assert (said.startswith("Reads the same as an earlier item"), role) == (True, "text2")
     LEAVING[way](designer)
-    assert shown(designer) == 2, "the text and its short label"
+    assert problem_count(designer) == 2, "the text and its short label"
     designer.go_to(*COPY)
     row = designer.form_row(*COPY, "text")
     assert (row.fault_line.sentence.text(), row.fault_line.sentence.property("role")) == (said, "bad")
@@ -121,7 +121,7 @@ def test_each_way_to_leave_a_copy_shows_that_it_reads_the_same(designer: Any, wa
     assert line.property("state") == "refused"
 
 
-def test_save_says_how_many_problems_an_unfinished_entry_has(designer: Any) -> None:
+def test_save_states_the_problems_of_an_unfinished_entry(designer: Any) -> None:
     duplicate_question(designer)
     designer.hit("ctrl+s")
     assert designer.saving.banner.text == "Saved, but the study cannot be run yet because of 2 problems"
@@ -135,7 +135,7 @@ def test_a_copy_that_is_reworded_before_it_is_left_never_has_a_problem(designer:
     qtbot.waitUntil(lambda: designer.value(*COPY, "id") == "i_knew_which_one_was_x")
     assert every_problem(designer) == 0
     designer.place.parts.show_tab("file")
-    assert shown(designer) == 0
+    assert problem_count(designer) == 0
 
 
 def test_a_block_without_conditions_is_unfinished_until_it_is_left(designer: Any) -> None:
@@ -143,17 +143,17 @@ def test_a_block_without_conditions_is_unfinished_until_it_is_left(designer: Any
     designer.go_to(*BLOCK)
     for expected in ("The block has one condition", "Specify either conditions or stimulus"):
         designer.editing.handle_request(RemoveKey((*BLOCK, "conditions", 0)))
-        assert shown(designer) == 0
+        assert problem_count(designer) == 0
         assert designer.form_row(*BLOCK, "conditions").fault_line.sentence.text().startswith(expected)
     designer.editing.handle_request(AddEntry((*BLOCK, "conditions"), "thin"))
     designer.editing.handle_request(AddNamed((*BLOCK, "conditions"), "conditions"))
     assert designer.editing.selected == ("conditions", "condition")
-    assert shown(designer) == 0
+    assert problem_count(designer) == 0
     designer.editing.go_back()
     designer.editing.handle_request(RemoveKey((*BLOCK, "conditions", 1)))
-    assert shown(designer) == 0, "the block waited for its new condition"
+    assert problem_count(designer) == 0, "the block waited for its new condition"
     designer.go_to("pages", "welcome")
-    assert shown(designer) == every_problem(designer) == 1
+    assert problem_count(designer) == every_problem(designer) == 1
 
 
 @pytest.mark.parametrize(
@@ -171,11 +171,11 @@ def test_a_block_that_is_given_another_kind_is_unfinished(
         plain = Unset((*BLOCK, "design")), Unset((*BLOCK, "standard"))
         designer.editing.make_step("Make a plain block", Set((*BLOCK, "conditions"), ["thin"]), *plain)
     designer.go_to("blocks", block)
-    assert shown(designer) == 0
+    assert problem_count(designer) == 0
     designer.editing.handle_request(change)
-    assert shown(designer) == 0
+    assert problem_count(designer) == 0
     designer.go_to("pages", "welcome")
-    assert shown(designer) == 1
+    assert problem_count(designer) == 1
     (problem,) = designer.place.problems.problems
     assert problem.message == "The block has one condition, but its design compares at least two"
 
@@ -184,11 +184,11 @@ def test_a_problem_that_an_element_had_before_stays_shown(designer: Any) -> None
     begin(designer)
     designer.editing.make_step("Change", Set((*BLOCK, "repetitions"), 0))
     designer.go_to(*BLOCK)
-    assert shown(designer) == 1
+    assert problem_count(designer) == 1
     designer.editing.handle_request(RemoveKey((*BLOCK, "conditions", 0)))
-    assert shown(designer) == 1
+    assert problem_count(designer) == 1
     designer.go_to("pages", "welcome")
-    assert shown(designer) == every_problem(designer)
+    assert problem_count(designer) == every_problem(designer)
 
 
 def test_a_field_that_is_added_is_unfinished_until_another_one_has_the_keyboard(designer: Any) -> None:
@@ -197,9 +197,9 @@ def test_a_field_that_is_added_is_unfinished_until_another_one_has_the_keyboard(
     designer.editing.handle_request(AddKey(("liquids", "thin", "region")))
     designer.editing.handle_request(SetValue(("liquids", "thin", "region", "min_mm"), [90, 0, 0]))
     assert every_problem(designer) == 1
-    assert shown(designer) == 0
+    assert problem_count(designer) == 0
     designer.field("liquids", "thin", "density_kg_m3").take_keyboard()
-    assert shown(designer) == 1
+    assert problem_count(designer) == 1
 
 
 DELETED = {
@@ -213,7 +213,7 @@ DELETED = {
 
 
 @pytest.mark.parametrize("kind", DELETED)
-def test_a_deletion_by_keys_says_how_to_undo_it_and_tab_skips_its_button(designer: Any, kind: str) -> None:
+def test_a_deletion_by_keys_explains_undo_and_tab_skips_its_button(designer: Any, kind: str) -> None:
     path, field, keys, name = DELETED[kind]
     designer.window.resize(1366, 700)
     begin(designer)
@@ -239,7 +239,7 @@ def test_a_deletion_by_keys_says_how_to_undo_it_and_tab_skips_its_button(designe
     assert designer.text == before
 
 
-def test_an_emptied_list_gives_the_keyboard_to_what_adds_to_it(designer: Any) -> None:
+def test_an_emptied_list_gives_the_keyboard_to_its_add_button(designer: Any) -> None:
     begin(designer)
     designer.go_to(*BLOCK)
     conditions = designer.field(*BLOCK, "conditions")
@@ -262,11 +262,11 @@ def test_undo_of_a_step_elsewhere_leaves_the_entry(designer: Any) -> None:
     designer.editing.undo()
     designer.editing.redo()
     assert designer.study.unfinished == ()
-    assert shown(designer) == 2
+    assert problem_count(designer) == 2
 
 
 def test_enter_does_not_confirm_a_deletion_that_also_deletes_other_elements(designer: Any) -> None:
-    """A block that names only the deleted liquid would go with it."""
+    """A block that names only the deleted liquid would be deleted with it."""
     begin(designer)
     before, liquid = designer.study.text, next(iter(designer.study.document["liquids"]))
     designer.controller.ask_to_delete(("liquids", liquid))
@@ -278,7 +278,7 @@ def test_enter_does_not_confirm_a_deletion_that_also_deletes_other_elements(desi
     assert designer.study.text == before
 
 
-def test_labels_of_another_language_are_no_problem_while_they_are_typed(designer: Any) -> None:
+def test_labels_of_another_language_raise_no_problem_while_they_are_typed(designer: Any) -> None:
     begin(designer)
     labels = ("scales", "agreement", "labels")
     designer.editing.handle_request(ChangeLanguage("add", "nl"))

@@ -1,4 +1,4 @@
-"""Versions and copies of a study in several programs and places: none is lost, each leads to what changed."""
+"""Versions and copies of a study in several programs: none is lost, and each shows its changes."""
 
 import os
 import re
@@ -37,9 +37,9 @@ REPETITIONS = ("blocks", "liquids", "repetitions")
 
 
 def lines(designer: Any) -> list[str]:
-    """The lines of the difference that is shown, without its context."""
-    shown = designer.controller.changes.difference.toPlainText().splitlines()
-    return [line.partition("  #")[0].rstrip() for line in shown if line[:1] in {"-", "+"}]
+    """Return the changed lines of the shown difference, without context."""
+    difference = designer.controller.changes.difference.toPlainText().splitlines()
+    return [line.partition("  #")[0].rstrip() for line in difference if line[:1] in {"-", "+"}]
 
 
 STUDY = read_study(DEMO.encode())
@@ -60,13 +60,13 @@ def test_the_last_run_with_participants_comes_before_later_pilots() -> None:
     assert latest_run(()) is None
 
 
-def test_a_study_is_compared_with_a_text_or_with_what_a_receipt_holds(designer: Any) -> None:
+def test_a_study_is_compared_with_a_text_or_with_a_receipt(designer: Any) -> None:
     before = DEMO.replace("repetitions = 1 ", "repetitions = 3 ", 1)
-    shown = compare(Version(before.replace("\n", "\r\n")), STUDY)
-    assert [line.partition("  #")[0].rstrip() for line in shown.lines if line[0] in "+-"] == [
+    comparison = compare(Version(before.replace("\n", "\r\n")), STUDY)
+    assert [line.partition("  #")[0].rstrip() for line in comparison.lines if line[0] in "+-"] == [
         "-repetitions = 3", "+repetitions = 1"
     ]  # fmt: skip
-    assert shown.note == ""
+    assert comparison.note == ""
     assert compare(Version(DEMO), STUDY) == Comparison((), "The study is identical to this version.")
     designer.open()
     run(designer, "P001", before.encode())
@@ -80,15 +80,15 @@ def test_a_study_is_compared_with_a_text_or_with_what_a_receipt_holds(designer: 
         assert compare(version, study).note.startswith("This computer does not have a copy of this version. To list")
 
 
-def test_the_source_of_a_run_is_that_of_the_file_if_it_has_this_content(designer: Any) -> None:
+def test_the_source_of_a_run_is_the_file_if_its_content_matches(designer: Any) -> None:
     designer.open()
-    opened: Document = designer.editing.opened
+    document: Document = designer.editing.opened
     designer.editing.handle_request(SetValue(REPETITIONS, 3))
     ran, other = run_with(protocol_hash(DEMO.encode()), "1.0", sessions=1), run_with("0" * 64, "1.0", sessions=1)
-    assert version_of(opened, ran) == Version(DEMO, ran)
-    assert version_of(opened, ran).text == DEMO
-    assert version_of(opened, other) == Version(None, other)
-    assert version_of(opened, other).text is None
+    assert version_of(document, ran) == Version(DEMO, ran)
+    assert version_of(document, ran).text == DEMO
+    assert version_of(document, other) == Version(None, other)
+    assert version_of(document, other).text is None
 
 
 @pytest.mark.parametrize(
@@ -99,13 +99,13 @@ def test_the_card_for_saving_asks_for_a_version_or_a_name(qtbot: Any, problems: 
         Standing("1.2", "1.1", 0, True, 2),
         (run_with("a", "1.0", sessions=2), run_with("b", "1.1", sessions=1, pilots=3)),
     )
-    card, heard = (
+    card, signals = (
         SaveCard(standing, (*known, run_with("c", "0.9", pilots=1)), Comparison(("-a", "+b"), "Note."), problems),
         [],
     )
     qtbot.addWidget(card)
     for name in ("save_asked", "another_asked", "changes_asked"):
-        getattr(card, name).connect(lambda *given, name=name: heard.append((name, *given)))
+        getattr(card, name).connect(lambda *arguments, name=name: signals.append((name, *arguments)))
     words = " ".join(part.text() for part in card.findChildren(QLabel))
     assert "has been run: 2 sessions with version 1.0; 1 session, 3 pilots with version 1.1. A version" in words
     assert (card.difference.toPlainText(), card.difference.isHidden(), "Note." in words) == ("-a\n+b", False, True)
@@ -135,7 +135,7 @@ def test_the_card_for_saving_asks_for_a_version_or_a_name(qtbot: Any, problems: 
     card.save.click()
     card.refuse("taken.")
     assert card.refusal.text() == "Taken."
-    assert heard == [("save_asked", "1.3"), ("changes_asked",), *[("another_asked", "mine")] * 2]
+    assert signals == [("save_asked", "1.3"), ("changes_asked",), *[("another_asked", "mine")] * 2]
 
 
 def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
@@ -197,7 +197,7 @@ else:
 """
 
 
-def test_the_card_for_saving_lists_what_was_run_and_its_buttons_do_what_they_say(designer: Any, qtbot: Any) -> None:
+def test_the_card_for_saving_lists_runs_and_its_buttons_work(designer: Any, qtbot: Any) -> None:
     source, version = designer.file.read_bytes(), re.compile(rb'^version = "[^"]*"', re.M)
     for participant, stated, pilot in (("P001", b"2.5", False), ("P002", b"0.9", True)):
         run(designer, participant, version.sub(b'version = "%s"' % stated, source), pilot=pilot)
@@ -232,7 +232,7 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     designer.saving.answer_banner("keep")
     designer.saving.save()
     assert "repetitions = 3" in designer.file.read_text("utf-8")
-    kept = [kept_content(one.hash) or b"" for one in kept_versions(designer.file)]
+    kept = [kept_content(version.hash) or b"" for version in kept_versions(designer.file)]
     assert any(b"Saved elsewhere" in content for content in kept)
 
     designer.editing.handle_request(SetValue(REPETITIONS, 4))
@@ -285,7 +285,7 @@ def test_changes_begin_with_the_last_session_where_no_participant_was_run(
     assert (designer.text, changes.restore.isEnabled()) == (before, False)
 
 
-def test_the_version_of_a_session_in_results_leads_to_what_changed(
+def test_the_version_of_a_session_in_results_leads_to_its_changes(
     qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
@@ -315,7 +315,7 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     card.show_sessions([facts, replace(facts, participant="P002", folder=folder.parent)])
     table = card.rows.table
     words = [[str(table.model().index(row, column).data()) for column in range(4)] for row in range(2)]
-    assert [row[3] for row in words] == ["1.0", ""]
+    assert [row[3] for row in words] == ["1.1", ""]
     card.rows.table.selectRow(1)
     assert not card.version.isEnabled()
     card.rows.table.selectRow(0)
@@ -326,15 +326,15 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     assert visit.designer is not None
     changes = visit.designer.changes
     assert changes.chosen == protocol_hash(source)
-    assert changes.version.currentText().startswith("1.0: 1 session")
+    assert changes.version.currentText().startswith("1.1: 1 session")
     assert visit.designer.place.pane.tab == "changes"
-    changed = source.replace(b'version = "1.0"', b'version = "1.1"', 1)
-    run(designer, "P002", changed, study="elsewhere", version="1.1", started_at="2026-11-20T12:00:00+00:00")
+    changed = source.replace(b'version = "1.1"', b'version = "1.2"', 1)
+    run(designer, "P002", changed, study="elsewhere", version="1.2", started_at="2026-11-20T12:00:00+00:00")
     designer.file.unlink()
     visit.show_version(facts)
     assert visit.window.notice is not None
-    texts = [shown.text() for shown in visit.window.notice.findChildren(QLabel)]
-    assert any(text.startswith("Version 1.1 (first session: P002, 2026-11-20): ") for text in texts)
+    texts = [label.text() for label in visit.window.notice.findChildren(QLabel)]
+    assert any(text.startswith("Version 1.2 (first session: P002, 2026-11-20): ") for text in texts)
     visit.window.close()
     visit.end()
     visit.window.deleteLater()
@@ -353,10 +353,10 @@ def test_a_text_that_is_being_typed_is_in_the_draft_when_the_designer_is_left(de
     assert designer.value("study", "version") == "3.7"
 
 
-def test_a_return_to_the_designer_shows_what_other_programs_wrote_meanwhile(designer: Any) -> None:
+def test_returning_to_the_designer_shows_changes_of_other_programs(designer: Any) -> None:
     designer.open("kitchen", "study")
     designer.window.go("home")
-    designer.change(('version = "1.0"', 'version = "1.7"'))
+    designer.change(('version = "1.1"', 'version = "1.7"'))
     designer.file.with_name("bath.toml").write_text(DEMO, encoding="utf-8", newline="\n")
     designer.window.go("designer")
     assert designer.field("study", "version").line.text() == "1.7"
@@ -369,14 +369,14 @@ def test_a_return_to_the_designer_shows_what_other_programs_wrote_meanwhile(desi
     assert designer.place.banner.sentence.text().startswith("Another program has changed this file, and you have")
 
 
-@pytest.mark.parametrize("found", [4.0, 5.0])
+@pytest.mark.parametrize("estimate", [4.0, 5.0])
 def test_the_chosen_card_shows_its_template_and_whether_a_known_answer_is_recovered(
-    designer: Any, found: float
+    designer: Any, estimate: float
 ) -> None:
     designer.controller.show_new_page()
     page = designer.place.new_page
-    card, before = page.card, next(one.choice for one in page.buttons if one.choice.recovery)
-    answer = replace(before.recovery, planted=4.1, found=found, low=3.0, high=6.0)
+    card, before = page.card, next(button.choice for button in page.buttons if button.choice.recovery)
+    answer = replace(before.recovery, planted=4.1, found=estimate, low=3.0, high=6.0)
     choice = replace(
         before, source="a", title="Thicker", description="Which is thicker?", study_title="Two oils",
         session=(("lock", "Welcome", "1 min"), ("layers", "Stirring", "7 min")), recovery=answer, languages=("nl",),
@@ -390,7 +390,7 @@ def test_the_chosen_card_shows_its_template_and_whether_a_known_answer_is_recove
         assert tuple(words[at : at + len(texts)]) == texts
     assert [chip.word for chip in card.about.findChildren(Chip)] == ["Up to 3 N", "Double-blind"]
     (chip,) = card.details.findChildren(Chip)
-    assert (chip.word, chip.tone) == (("recovered", "ok") if found == 4.0 else ("not recovered", "warn"))
+    assert (chip.word, chip.tone) == (("recovered", "ok") if estimate == 4.0 else ("not recovered", "warn"))
     assert answer.sentence in words
     assert not {"Other", "Another"} & set(words)
     assert card.questions.title.placeholderText() == "Two oils"

@@ -1,4 +1,4 @@
-"""What the designer says of versions, drafts, playing and problems: calls and their results, without a window.
+"""The designer's texts on versions, drafts, playing and problems: calls and their results, without a window.
 
 People change ``words.txt``; no option regenerates it.
 """
@@ -42,9 +42,9 @@ def demo(*changes: str) -> str:
     return text
 
 
-def recovery(found: float, low: float, high: float) -> tuple[Any, ...]:
-    """Return what is said of an estimate of 40 ms."""
-    answer = KnownAnswer(planted=40.0, unit="ms", source="a thesis", people=17, found=found, low=low, high=high)
+def recovery(estimate: float, low: float, high: float) -> tuple[Any, ...]:
+    """Return the verdict on an estimate of 40 ms, and its sentence."""
+    answer = KnownAnswer(planted=40.0, unit="ms", source="a thesis", people=17, found=estimate, low=low, high=high)
     return answer.recovered, answer.most, answer.sentence
 
 

@@ -1,4 +1,4 @@
-"""Settings of their own, the built template, and the stand-in for Force Dimension's library."""
+"""Fixtures: separate settings, the built template, and the stand-in for Force Dimension's library."""
 
 import importlib.util
 import os
@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.devices.force_dimension.standin import COMPILER, StandIn, build
-from tests.plug_in_packages import TEMPLATE, forget, install
+from tests.plug_in_packages import TEMPLATE, forget_plug_ins, install
 
 
 @pytest.fixture
@@ -25,14 +25,14 @@ def falcon_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[N
     monkeypatch.syspath_prepend(site)
     paths = (str(site), str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, paths)))  # an empty one is the present folder
-    forget()
+    forget_plug_ins()
     yield
-    forget()
+    forget_plug_ins()
 
 
 @pytest.fixture(autouse=True)
 def own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No calibration of this machine's user meets a test."""
+    """Keep calibrations of this machine's user away from tests."""
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
 
 
@@ -54,9 +54,9 @@ def built_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def template(built_template: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Install the built template."""
     monkeypatch.syspath_prepend(built_template)
-    forget()
+    forget_plug_ins()
     yield built_template
-    forget()
+    forget_plug_ins()
 
 
 @pytest.fixture(scope="session")
@@ -68,10 +68,10 @@ def standin_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def standin(standin_library: Path) -> Iterator[StandIn]:
-    one = StandIn(standin_library)
-    one.loaded.standin_reset()
-    yield one
-    one.loaded.standin_reset()
+    stand_in = StandIn(standin_library)
+    stand_in.loaded.standin_reset()
+    yield stand_in
+    stand_in.loaded.standin_reset()
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Every device of the program and the template, open, with what its motors, its operator and its cable do."""
+"""Every device of the program and the template, open, with control of its motors, operator and cable."""
 
 import time
 from collections.abc import Callable
@@ -17,7 +17,7 @@ PATIENCE_S = 10.0
 
 
 def write(device: Any, force_n: Any = ZERO) -> tuple[int, Any]:
-    """Command a force; return what the device answered and the force that it says it sent."""
+    """Command a force; return the device's answer, and the sent force as it reports it."""
     command = new_command()
     command[0].force_n = command[0].sent_n = force_n
     return _called(device.write, device.context, command.ctypes.data), command[0].sent_n.copy()
@@ -42,19 +42,19 @@ class Ticks:
         self.now_ns = now_ns or max(started_ns, 10 * MS)
 
     def read(self, pause_ns: int = MS) -> int:
-        """Return what a reading answers."""
+        """Return the answer of a reading."""
         self.now_ns += pause_ns
         self.reading[0].measured = 0
         return _called(self.device.read, self.device.context, self.now_ns, self.reading.ctypes.data)
 
     def take(self, force_n: Any = ZERO, pause_ns: int = MS) -> tuple[int, Any]:
-        """Take a tick; return what the reading answered and the force that was sent, as the device says."""
+        """Take a tick; return the answer of the reading, and the sent force as the device reports it."""
         answer = self.read(pause_ns)
         time.sleep(self._pause_s)
         return answer, write(self.device, force_n)[1]
 
     def after(self, ticks: int, force_n: Any = ZERO) -> int:
-        """Return what the last of so many readings answered."""
+        """Return the answer of the last of this number of readings."""
         for _ in range(ticks):
             answer, _ = self.take(force_n)
         return answer
@@ -66,7 +66,7 @@ class Ticks:
 
 @dataclass
 class Subject:
-    """A device that is open; its motors' force in the hand frame [N], and what happens to it."""
+    """An open device, with its motors' force in the hand frame [N] and its possible events."""
 
     device: Any
     acting_n: Callable[[], Any]
@@ -84,7 +84,7 @@ class Subject:
         return Ticks(self.device, now_ns, self.pause_s)
 
     def push(self, force_n: Any = (0.5, -1.0, 1.5)) -> Ticks:
-        """Return the ticks after which a force acts as a whole."""
+        """Advance until a force acts fully; return the ticks."""
         ticks = self.ticks()
         ticks.after(self.settle_ticks, force_n)
         until(lambda: np.allclose(self.acting_n(), force_n, atol=self.exact_n), "the force is not sent")
@@ -95,7 +95,7 @@ class Subject:
 
 
 def until(reached: Callable[[], bool], what: str, seconds: float = PATIENCE_S) -> None:
-    """Wait; most devices are there at once."""
+    """Wait for a condition, which most devices fulfil at once."""
     began = time.perf_counter()
     while not reached():
         assert time.perf_counter() - began < seconds, what
@@ -215,5 +215,7 @@ MOVING = (*UNFELT, falcon, inverse3, force_dimension, force_dimension_library)
 
 
 def over(*subjects: Callable[..., Subject]) -> pytest.MarkDecorator:
-    """Run a test over these devices."""
-    return pytest.mark.parametrize("made", subjects, ids=[one.__name__.replace("_", "-") for one in subjects])
+    """Parametrise a test over these devices."""
+    return pytest.mark.parametrize(
+        "make_subject", subjects, ids=[subject.__name__.replace("_", "-") for subject in subjects]
+    )

@@ -29,8 +29,8 @@ def bus(*emulators):
 
 def by_name(*, usb=None, spacemice=None, d2xx=None, platform="linux"):
     hardware = [*probe_spacemouse(spacemice or hid()), probe_falcon(usb or bus(), platform), probe_ftdi(d2xx, platform)]
-    looked_for = {(one.name, one.by.split()[0]): one for one in backends()}
-    return looked_for | {(one.name, one.by.split()[0]): one for one in hardware}
+    looked_for = {(backend.name, backend.by.split()[0]): backend for backend in backends()}
+    return looked_for | {(backend.name, backend.by.split()[0]): backend for backend in hardware}
 
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="the emulated bus is compiled")
@@ -41,7 +41,7 @@ def test_every_device_that_can_be_opened_is_listed():
     assert named == set(list_devices())
 
 
-def test_without_hardware_each_says_what_is_missing():
+def test_without_hardware_each_backend_asks_to_connect_its_device():
     listed = by_name()
     assert listed["mouse", "the"].state == READY
     for key in (("falcon", "libusb"), ("spacemouse", "hidapi")):
@@ -49,7 +49,7 @@ def test_without_hardware_each_says_what_is_missing():
         assert "connect" in listed[key].why
 
 
-def test_what_is_connected_is_named():
+def test_connected_devices_are_named():
     from study_app.devices.emulators.falcon_emulator import Emulator
 
     listed = by_name(usb=bus(Emulator(serial="FT1"), Emulator(serial="FT2")), spacemice=hid(MODELS[1], MODELS[1]))
@@ -61,7 +61,7 @@ def test_what_is_connected_is_named():
 @pytest.mark.parametrize(
     ("platform", "words"), [("linux", "this account"), ("win32", "driver"), ("darwin", "FTDI driver")]
 )
-def test_one_that_does_not_tell_its_number_says_why_that_may_be(platform, words):
+def test_a_device_without_a_serial_number_states_possible_reasons(platform, words):
     from study_app.devices.emulators.falcon_emulator import Emulator
 
     emulator = Emulator()
@@ -83,20 +83,20 @@ def test_ftdis_driver_is_for_windows(monkeypatch):
     assert "install FTDI's D2XX driver" in by_name(platform="win32")["falcon", "ftd2xx"].why
 
 
-def test_a_hidapi_that_does_not_load_is_told(monkeypatch):
+def test_a_hidapi_that_does_not_load_is_reported(monkeypatch):
     from study_app.devices.spacemouse import hid as spacemouse_hid
 
     def missing(name):
         raise OSError(f"no {name}")
 
     monkeypatch.setattr(spacemouse_hid, "import_module", missing)
-    spacemouse = next(one for one in backends() if one.name == "spacemouse")
+    spacemouse = next(backend for backend in backends() if backend.name == "spacemouse")
     assert spacemouse.state == NOT_AVAILABLE
     assert "pip install hidapi" in spacemouse.why
 
 
 @pytest.mark.slow
-def test_this_machine_can_be_asked_and_no_compiler_is_loaded():
+def test_backends_are_listed_without_loading_the_compiler():
     program = (
         "import sys; from study_app.devices.registry import backends; print(len(backends())); "
         "sys.exit('numba' in sys.modules)"
@@ -112,8 +112,8 @@ def test_this_machine_can_be_asked_and_no_compiler_is_loaded():
 def test_a_missing_device_is_reported_before_anything_is_compiled(
     monkeypatch: pytest.MonkeyPatch, states: tuple[str, ...], missing: bool
 ) -> None:
-    found = [Backend("pen", "a library", state=state, can="force", why="connect its cable") for state in states]
-    pen = SimpleNamespace(title="Pen", probe=lambda: found)
+    pen_backends = [Backend("pen", "a library", state=state, can="force", why="connect its cable") for state in states]
+    pen = SimpleNamespace(title="Pen", probe=lambda: pen_backends)
     monkeypatch.setattr(registry, "descriptor_of", lambda _name: pen)
     if not missing:
         registry.check_connected("pen")

@@ -49,10 +49,10 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
-def subject(made: Callable[..., Subject], request: pytest.FixtureRequest) -> Iterator[Subject]:
-    one = made(request)
-    yield one
-    one.device.close()
+def subject(make_subject: Callable[..., Subject], request: pytest.FixtureRequest) -> Iterator[Subject]:
+    subject = make_subject(request)
+    yield subject
+    subject.device.close()
 
 
 def virtual_servo(device: Any) -> Any:
@@ -75,8 +75,10 @@ def stroke(subject: Subject) -> Any:
 
 
 @over(*UNFELT, *FELT)
-def test_a_receipt_can_hold_what_a_device_is(made: Callable[..., Subject], request: pytest.FixtureRequest) -> None:
-    device = made(request, workspace_m=(0.04, 0.03, 0.02), force_limit_n=3.0).device
+def test_a_receipt_can_store_the_description_of_a_device(
+    make_subject: Callable[..., Subject], request: pytest.FixtureRequest
+) -> None:
+    device = make_subject(request, workspace_m=(0.04, 0.03, 0.02), force_limit_n=3.0).device
     described = device.describe()
     assert json.loads(json.dumps(described)) == described
     assert described["name"] == device.name
@@ -106,9 +108,9 @@ def test_a_force_acts_in_the_hand_frame_until_the_device_is_closed(subject: Subj
     "asked_n", [(3.0, 0.0, 4.0), (np.nan, 0.0, 1.0), (0.0, np.inf, 0.0)], ids=["too great", "nan", "inf"]
 )
 def test_no_force_is_beyond_the_limit_or_not_finite(
-    made: Callable[..., Subject], asked_n: tuple[float, float, float], request: pytest.FixtureRequest
+    make_subject: Callable[..., Subject], asked_n: tuple[float, float, float], request: pytest.FixtureRequest
 ) -> None:
-    subject = made(request, force_limit_n=2.0)
+    subject = make_subject(request, force_limit_n=2.0)
     with subject.device:
         ticks = subject.push()
         sent_n = ticks.take(asked_n)[1]
@@ -197,50 +199,52 @@ STREAM = [
 ]
 
 
-def words_of(made: Callable[..., Subject], mode: str) -> tuple[str, str]:
+def words_of(make_subject: Callable[..., Subject], mode: str) -> tuple[str, str]:
     """Return cause and cure of a mode of failure."""
-    known = {falcon: FALCON, inverse3: INVERSE3}.get(made, FORCE_DIMENSION).mode(mode)
+    known = {falcon: FALCON, inverse3: INVERSE3}.get(make_subject, FORCE_DIMENSION).mode(mode)
     return known.symptom, known.cure
 
 
-@pytest.mark.parametrize(("made", "fault", "mode"), STREAM, ids=[f"{one.__name__}-{fault}" for one, fault, _ in STREAM])
+@pytest.mark.parametrize(
+    ("make_subject", "fault", "mode"), STREAM, ids=[f"{make.__name__}-{fault}" for make, fault, _ in STREAM]
+)
 def test_a_fault_in_a_stroke_ends_in_its_message_zero_force_and_silence(
-    subject: Subject, made: Callable[..., Subject], fault: str, mode: str, request: pytest.FixtureRequest
+    subject: Subject, make_subject: Callable[..., Subject], fault: str, mode: str, request: pytest.FixtureRequest
 ) -> None:
     device, servo = subject.device, stroke(subject)
-    if made is force_dimension_library:
+    if make_subject is force_dimension_library:
         request.getfixturevalue("standin").fault(fault)
     else:
-        (device.emulated if made is force_dimension else device.hand).set_fault(fault)
+        (device.emulated if make_subject is force_dimension else device.hand).set_fault(fault)
     assert servo.advance(100) < 60
     with pytest.raises((DeviceLost, ServoFault)) as ended:
         servo.check()
-    message, (known, cure) = str(ended.value), words_of(made, mode)
+    message, (known, cure) = str(ended.value), words_of(make_subject, mode)
     assert message.startswith(f"the device '{device.name}' stopped: ")
     assert message.endswith("; the force is zero")
     assert known in message
     assert cure in message
-    if made is force_dimension_library:  # write-error: it takes no force, not the last zero either
+    if make_subject is force_dimension_library:  # write-error: it takes no force, not the last zero either
         state = request.getfixturevalue("standin").state
         assert (state["stopped"], state["force_on"]) == (1.0, 0.0)
         assert fault != "turns-off" or "(velocity threshold)" in message
         request.getfixturevalue("standin").loaded.standin_reset()
-    elif made is not falcon:  # its cable or its power is out: its guard waits
+    elif make_subject is not falcon:  # its cable or its power is out: its guard waits
         assert subject.is_quiet()  # before anything is closed
-    if made is inverse3:
+    if make_subject is inverse3:
         commands, pushes = int(device.hand.state.commands), int(device.hand.state.pushes)
         servo.stop()
         device.close()
         assert device.hand.state.pushes == pushes
         assert mode == "no-reply" or device.hand.state.commands == commands
-    if made is falcon:
+    if make_subject is falcon:
         device.hand.faults.off("unplugged")
         device.hand.power(False)
 
 
-def refused(made: Callable[..., Subject], fault: str, request: pytest.FixtureRequest) -> DeviceError:
-    """Open a device with a fault; return how it is refused, without any force and with nothing left open."""
-    if made is inverse3:
+def refused(make_subject: Callable[..., Subject], fault: str, request: pytest.FixtureRequest) -> DeviceError:
+    """Open a device with a fault; return its error, after checking that no force acts and nothing stays open."""
+    if make_subject is inverse3:
         from study_app.devices.emulators.inverse3 import EmulatedInverse3
         from study_app.devices.emulators.inverse3_service import Service
 
@@ -281,31 +285,37 @@ OPENING = [
 
 
 @pytest.mark.parametrize(
-    ("made", "fault", "mode"), OPENING, ids=[f"{one.__name__}-{fault}" for one, fault, _ in OPENING]
+    ("make_subject", "fault", "mode"), OPENING, ids=[f"{make.__name__}-{fault}" for make, fault, _ in OPENING]
 )
 def test_a_fault_of_opening_is_refused_with_cause_and_cure_and_without_force(
-    made: Callable[..., Subject], fault: str, mode: str, request: pytest.FixtureRequest
+    make_subject: Callable[..., Subject], fault: str, mode: str, request: pytest.FixtureRequest
 ) -> None:
-    found = refused(made, fault, request)
-    known = (INVERSE3 if made is inverse3 else FORCE_DIMENSION).mode(mode)
-    assert found.mode == mode
-    assert "\n" not in str(found)
-    assert known.cause in str(found)
-    assert str(found).endswith(known.cure)
-    if made is force_dimension_library:
+    error = refused(make_subject, fault, request)
+    known = (INVERSE3 if make_subject is inverse3 else FORCE_DIMENSION).mode(mode)
+    assert error.mode == mode
+    assert "\n" not in str(error)
+    assert known.cause in str(error)
+    assert str(error).endswith(known.cure)
+    if make_subject is force_dimension_library:
         options = {OPTION: request.getfixturevalue("standin").path}
         report = doctor_of("force-dimension").examine("force-dimension", options=options, progress=str)
-        assert [one.id for one in report.found] == [mode]
+        assert [finding.id for finding in report.found] == [mode]
 
 
 def test_the_tables_of_faults_are_complete() -> None:
     from tests.devices.force_dimension.standin import FAULTS as STANDIN
 
-    tried = {made: {fault for one, fault, _ in (*STREAM, *OPENING) if one is made} for made in MOVING}
-    for made, name, others in ((force_dimension, "force-dimension", set()), (inverse3, "inverse3", {"slow", "torn"})):
+    tried = {
+        make_subject: {fault for maker, fault, _ in (*STREAM, *OPENING) if maker is make_subject}
+        for make_subject in MOVING
+    }
+    for make_subject, name, others in (
+        (force_dimension, "force-dimension", set()),
+        (inverse3, "inverse3", {"slow", "torn"}),
+    ):
         with open_device(f"{name}-emulated") as device, pytest.raises(DeviceError) as refused:
             device.take_fault("none of them")
-        assert tried[made] | others == set(str(refused.value).partition("choose from: ")[2].split(", "))
+        assert tried[make_subject] | others == set(str(refused.value).partition("choose from: ")[2].split(", "))
     elsewhere = {"none", "slow", "hangs", "guarded", "saturated", "unwatched", "deaf", "unmodelled", "plain"}
     assert tried[force_dimension_library] | elsewhere == set(STANDIN)
 
@@ -349,7 +359,7 @@ def _hang_force_dimension(device: Any, until_released: Callable[[], None]) -> An
 
 
 @pytest.mark.parametrize(
-    ("made", "hang"),
+    ("make_subject", "hang"),
     [
         (falcon, _hang_falcon),
         (inverse3, _hang_inverse3),
@@ -465,7 +475,7 @@ def test_a_program_that_is_killed_while_it_pushes_leaves_no_force(
         ("force-dimension-emulated", [], True, True, True, None),
     ],
 )
-def test_who_holds_a_device_and_what_it_takes_follows_from_its_name(
+def test_a_name_determines_the_options_and_properties_of_a_device(
     name: str, options: list[str], doctor: bool, by_itself: bool, simulated: bool, shows_force: bool | None
 ) -> None:
     device = descriptor_of(name)
@@ -477,13 +487,13 @@ def test_who_holds_a_device_and_what_it_takes_follows_from_its_name(
 @pytest.mark.parametrize(
     "name", ["falcn", "mouse:2", "falcon-emulated:x", "inverse3-emulated:x", "falcon-sockets:x", ":"]
 )
-def test_a_name_that_is_none_is_refused_with_those_there_are(name: str) -> None:
+def test_an_unknown_name_is_refused_with_the_known_ones(name: str) -> None:
     with pytest.raises(DeviceNotFound, match="is not known; choose one of: mouse, falcon, "):
         open_device(name)
     assert list_devices()[0] == "mouse"
 
 
-def test_a_device_without_a_doctor_is_told_which_devices_have_one() -> None:
+def test_a_device_without_a_doctor_is_refused_with_those_that_have_one() -> None:
     with pytest.raises(DeviceError, match="the doctor command does not support 'mouse', only ") as refused:
         doctor_of("mouse")
     listed = str(refused.value).partition("', only ")[2].partition(": see ")[0].split(", ")
@@ -494,12 +504,12 @@ def test_a_device_without_a_doctor_is_told_which_devices_have_one() -> None:
 def test_every_finding_of_a_doctor_has_a_cause_a_cure_and_how_it_is_known(name: str) -> None:
     doctor = doctor_of(name)
     findings = doctor.findings()
-    assert len({one.id for one in findings}) == len(findings)
-    assert [one.number for one in findings] == list(range(1, len(findings) + 1))
-    for one in findings:
-        assert one.state in {"not checked", "ok"}
-        assert all((one.tested, one.symptom, one.cause, one.known_by))
-        assert "\n" not in one.tested + one.symptom + one.cause + one.cure
+    assert len({finding.id for finding in findings}) == len(findings)
+    assert [finding.number for finding in findings] == list(range(1, len(findings) + 1))
+    for finding in findings:
+        assert finding.state in {"not checked", "ok"}
+        assert all((finding.tested, finding.symptom, finding.cause, finding.known_by))
+        assert "\n" not in finding.tested + finding.symptom + finding.cause + finding.cure
     with pytest.raises(DeviceError, match="faults can be simulated only with"):
         doctor.examine(name, options={}, faults=["nan"], progress=str)
     with pytest.raises(DeviceError, match="fault 'thirst' is not known; choose from: "):
@@ -521,16 +531,16 @@ def test_every_finding_of_a_doctor_has_a_cause_a_cure_and_how_it_is_known(name: 
         ("force-dimension", "time-guard", "rate"),
     ],
 )
-def test_a_doctor_finds_what_is_wrong_and_nothing_else(name: str, fault: str | None, mode: str | None) -> None:
+def test_a_doctor_finds_exactly_the_simulated_fault(name: str, fault: str | None, mode: str | None) -> None:
     report = doctor_of(name).examine(f"{name}-emulated", options={}, faults=[fault] if fault else [], progress=str)
-    assert [one.id for one in report.found] == ([mode] if mode else [])
+    assert [finding.id for finding in report.found] == ([mode] if mode else [])
     if mode is None:
         assert report.well
         assert report.conclusion == "No problems were found."
         assert "new positions per second: 1000" in " ".join(report.seen)
     else:
         assert report.failure is None or report.found[0].cure in report.failure
-        order = [one.state for one in report.findings]
+        order = [finding.state for finding in report.findings]
         assert "found" not in order[order.index("found") + 1 :]
         lines = report_lines(report)
         for finding in report.findings:

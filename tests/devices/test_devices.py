@@ -34,7 +34,7 @@ def test_a_device_without_the_parts_of_a_device_is_closed_and_named(monkeypatch:
 
 
 @pytest.mark.usefixtures("falcon_socket")
-def test_a_name_that_is_not_enough_is_refused_with_what_is_missing() -> None:
+def test_an_incomplete_name_is_refused_with_the_missing_part() -> None:
     with pytest.raises(DeviceNotFound, match="falcon-socket:PATH"):
         open_device("falcon-socket")
 
@@ -45,11 +45,11 @@ def test_naming_the_devices_loads_no_compiler() -> None:
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
 
 
-def is_cancelled(opened: list[Any]) -> Callable[[], bool]:
-    return lambda: bool(opened)
+def is_cancelled(devices: list[Any]) -> Callable[[], bool]:
+    return lambda: bool(devices)
 
 
-def fails(_opened: list[Any]) -> Callable[[], bool]:
+def failing_callback(_devices: list[Any]) -> Callable[[], bool]:
     def fail() -> bool:
         raise RuntimeError("the window is gone")
 
@@ -59,24 +59,24 @@ def fails(_opened: list[Any]) -> Callable[[], bool]:
 @needs_servo
 @pytest.mark.parametrize(
     ("ask", "error", "words"),
-    [(is_cancelled, DeviceError, "'scripted' was cancelled"), (fails, RuntimeError, "the window is gone")],
+    [(is_cancelled, DeviceError, "'scripted' was cancelled"), (failing_callback, RuntimeError, "the window is gone")],
 )
 def test_a_device_cancelled_while_it_opens_is_closed_and_gets_no_servo(
     ask: Any, error: type[Exception], words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened: list[Any] = []
+    devices: list[Any] = []
     closed: list[str] = []
     open_before = rig.open_device
 
     def open_and_watch(*words: Any, **named: Any) -> Any:
         device = open_before(*words, **named)
-        opened.append(device)
+        devices.append(device)
         monkeypatch.setattr(device, "close", lambda: closed.append(device.name))
         return device
 
     monkeypatch.setattr(rig, "open_device", open_and_watch)
     with pytest.raises(error, match=words):
-        rig.open_rig("scripted", SETTINGS, cancelled=ask(opened))
+        rig.open_rig("scripted", SETTINGS, cancelled=ask(devices))
     assert closed == ["scripted"]
 
 

@@ -29,36 +29,36 @@ def liquid_study(*words, **options):
 
 
 @pytest.mark.parametrize("words", [(), ("list",)])
-def test_the_list_names_every_device_with_what_it_can_do(words):
-    listed = liquid_study(*words)
-    assert listed.exit_code == 0
+def test_the_list_states_the_abilities_of_every_device(words):
+    result = liquid_study(*words)
+    assert result.exit_code == 0
     for name in list_devices():
-        assert f"\n{name} " in "\n" + listed.output
-    assert "visual only, no force" in listed.output
-    assert "libusb" in listed.output
+        assert f"\n{name} " in "\n" + result.output
+    assert "visual only, no force" in result.output
+    assert "libusb" in result.output
 
 
 class TestDoctor:
     def test_modes_stand_in_their_order_with_cause_and_cure(self):
-        told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "never-homes")
-        assert told.exit_code == 3
-        rows = [line for line in told.output.splitlines() if line[:2].strip().isdigit()]
+        result = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "never-homes")
+        assert result.exit_code == 3
+        rows = [line for line in result.output.splitlines() if line[:2].strip().isdigit()]
         assert "FAULT" in rows[0]
         for state in ("not checked", " ok "):
             numbers = [int(row[:2]) for row in rows if state in row]
             assert numbers == sorted(numbers)
         assert len(rows) == len(FAILURES.modes)
-        found = told.output.split("FAULT")
-        assert len(found) == 2
-        assert "homing fails" in found[1]
-        assert "cause: not every arm has passed its index" in found[1]
-        assert "cure: push the grip in as far as it goes" in found[1]
+        sections = result.output.split("FAULT")
+        assert len(sections) == 2
+        assert "homing fails" in sections[1]
+        assert "cause: not every arm has passed its index" in sections[1]
+        assert "cure: push the grip in as far as it goes" in sections[1]
 
     def test_the_rule_to_paste_stands_in_one_line(self, monkeypatch):
         monkeypatch.setattr("sys.platform", "linux")
-        told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "access-denied")
-        assert told.exit_code == 3
-        assert f"\necho '{UDEV_RULE}' | sudo tee /etc/udev/rules.d/60-falcon.rules && " in told.output
+        result = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "access-denied")
+        assert result.exit_code == 3
+        assert f"\necho '{UDEV_RULE}' | sudo tee /etc/udev/rules.d/60-falcon.rules && " in result.output
 
     def test_a_device_without_wires_is_not_looked_at(self):
         refused = liquid_study("doctor", "--device", "scripted")
@@ -75,7 +75,7 @@ class TestDoctor:
             ("", "not known"),
         ],
     )
-    def test_a_fault_that_is_none_is_refused(self, fault, words):
+    def test_an_unknown_fault_is_refused(self, fault, words):
         refused = liquid_study("doctor", "--device", "falcon-emulated", "--fault", fault)
         assert words in str(refused.exception)
 
@@ -106,20 +106,20 @@ class TestTheTerminal:
         with pytest.raises(click.Abort):
             self.until(answered)
 
-    def test_at_the_bench_enter_alone_answers_only_the_question_to_let_go(self):
-        asked = SimpleNamespace(ask=lambda kind, _words: kind)
-        assert [_ask_operator(asked)(kind, "") for kind in ("let-go", "hang")] == ["let-go", "reading"]
+    def test_at_the_bench_enter_answers_only_the_question_to_let_go(self):
+        terminal = SimpleNamespace(ask=lambda kind, _words: kind)
+        assert [_ask_operator(terminal)(kind, "") for kind in ("let-go", "hang")] == ["let-go", "reading"]
 
 
 class TestCalibrate:
-    def test_what_an_emulated_one_weighs_is_kept_by_its_number(self, tmp_path):
-        told = liquid_study("calibrate", "--device", "falcon-emulated", "--grams", "400")
-        assert told.exit_code == 0, told.output
-        assert "Hang the 400 g weight" in told.output
-        assert "motor units per newton metre" in told.output
-        assert len([line for line in told.output.splitlines() if " +0.0" in line or " -0.0" in line]) >= 20
+    def test_the_calibration_of_an_emulated_falcon_is_stored_under_its_serial_number(self, tmp_path):
+        result = liquid_study("calibrate", "--device", "falcon-emulated", "--grams", "400")
+        assert result.exit_code == 0, result.output
+        assert "Hang the 400 g weight" in result.output
+        assert "motor units per newton metre" in result.output
+        assert len([line for line in result.output.splitlines() if " +0.0" in line or " -0.0" in line]) >= 20
         file = calibration_file("EMULATED-WEIGHED")
-        assert str(file) in told.output
+        assert str(file) in result.output
         assert json.loads(file.read_text("utf-8"))["poses"] == 20
         assert load_calibration("EMULATED-WEIGHED").units_per_nm == pytest.approx(6616, rel=0.01)
         assert load_calibration("EMULATED") is None  # rehearsals do not use it
@@ -140,7 +140,7 @@ class TestCalibrate:
         assert emulator.torques == (0, 0, 0)
 
     @pytest.mark.parametrize("words", [(), ("--grams", "400", "--scale"), ("--grams", "4000"), ("--grams", "heavy")])
-    def test_what_cannot_be_weighed_with_is_refused_at_once(self, words):
+    def test_unusable_weights_are_refused_at_once(self, words):
         assert liquid_study("calibrate", "--device", "falcon-emulated", *words).exit_code == 2
 
     def test_only_a_falcon_is_calibrated(self):

@@ -1,4 +1,4 @@
-"""An examination in a worker process: what it says, and that it can be ended at any time."""
+"""An examination in a worker process: its messages, and that it can be ended at any time."""
 
 import multiprocessing
 import time
@@ -15,45 +15,45 @@ pytestmark = [pytest.mark.slow, needs_servo]
 
 @pytest.fixture
 def begin():
-    """Return what begins an examination; each is closed."""
-    begun = []
+    """Return a function that starts examinations; each is closed after the test."""
+    examinations = []
 
-    def made(*words, **options):
-        begun.append(start_examination(*words, **options))
-        return begun[-1]
+    def start(*words, **options):
+        examinations.append(start_examination(*words, **options))
+        return examinations[-1]
 
-    yield made
-    for one in begun:
-        one.close()
-        one.wait_until_ended()
+    yield start
+    for examination in examinations:
+        examination.close()
+        examination.wait_until_ended()
     assert not [child for child in multiprocessing.active_children() if child.name == "examination"]
 
 
 def answers_to_the_last(examination, most_s=120.0):
-    """Return all answers, of which the last is no line."""
-    told, end = [], time.perf_counter() + most_s
-    while not told or isinstance(told[-1], str):
-        assert time.perf_counter() < end, told
-        told += [answer for _, answer in examination.answers(wait_s=0.1)]
-    return told
+    """Return all answers up to the first that is not a line."""
+    answers, end = [], time.perf_counter() + most_s
+    while not answers or isinstance(answers[-1], str):
+        assert time.perf_counter() < end, answers
+        answers += [answer for _, answer in examination.answers(wait_s=0.1)]
+    return answers
 
 
-def test_it_tells_its_lines_and_then_what_was_found(begin):
+def test_an_examination_sends_its_lines_and_then_its_report(begin):
     examination = begin("falcon-emulated", faults=("never-homes",))
-    told = answers_to_the_last(examination)
-    assert all(isinstance(line, str) for line in told[:-1])
-    assert isinstance(told[-1], Report)
-    assert [finding.id for finding in told[-1].found] == ["stroke-in"]
+    answers = answers_to_the_last(examination)
+    assert all(isinstance(line, str) for line in answers[:-1])
+    assert isinstance(answers[-1], Report)
+    assert [finding.id for finding in answers[-1].found] == ["stroke-in"]
     assert examination.answers() == []
 
 
-def test_what_is_no_falcon_is_told_in_a_sentence(begin):
+def test_an_unsupported_device_is_refused_in_one_sentence(begin):
     (refused,) = answers_to_the_last(begin("mouse"))
     assert isinstance(refused, Refused)
     assert "the doctor command does not support 'mouse'" in refused.sentence
 
 
-def test_a_process_that_dies_is_told(begin):
+def test_a_dying_process_is_reported(begin):
     examination = begin("falcon-emulated")
     examination.process.kill()
     *_, crashed = answers_to_the_last(examination)

@@ -1,4 +1,4 @@
-"""A device of another package: found at its entry point, and used everywhere, without a change of this package."""
+"""A device of another package: found by its entry point and usable everywhere, without changing this package."""
 
 import pytest
 from click.testing import CliRunner
@@ -118,9 +118,9 @@ class TestDeviceOfAnotherPackage:
         refused = liquid_study("run", "demo", "--participant", "P001", "--device", "mouse", "--toy-mass", "250")
         assert isinstance(refused.exception, DeviceError)
         assert str(refused.exception).startswith("device 'mouse' does not use toy-mass; only these do: Toy hand:")
-        found = liquid_study("devices", "doctor", "--device", "toy-hand", "--fault", "loose")
-        assert found.exit_code == 3
-        assert "FAULT          its string is loose" in found.output
+        result = liquid_study("devices", "doctor", "--device", "toy-hand", "--fault", "loose")
+        assert result.exit_code == 3
+        assert "FAULT          its string is loose" in result.output
 
 
 @pytest.mark.parametrize(
@@ -136,13 +136,13 @@ class TestDeviceOfAnotherPackage:
 )
 def test_a_broken_entry_point_is_one_row_and_every_other_device_stays(site, qtbot, value, source, reason):
     install(site, "toy_broken", "device", {"toy": value}, toy_broken=source)
-    listed = liquid_study("devices")
-    assert listed.exit_code == 0
-    (broken,) = (one for one in backends() if one.name == "toy (toy_broken)")
+    result = liquid_study("devices")
+    assert result.exit_code == 0
+    (broken,) = (backend for backend in backends() if backend.name == "toy (toy_broken)")
     assert reason in broken.why
     assert "\n" not in broken.why
-    assert "toy (toy_broken)    not available  (entry point)" in listed.output
-    assert "uninstall the package toy_broken" in " ".join(listed.output.split())
+    assert "toy (toy_broken)    not available  (entry point)" in result.output
+    assert "uninstall the package toy_broken" in " ".join(result.output.split())
     place = DevicesPlace()
     qtbot.addWidget(place)
     place.show_devices(devices_shown(backends()))
@@ -163,12 +163,12 @@ def test_a_device_that_cannot_be_looked_for_hides_no_other(site):
             '[Backend("toy-hand", "a string", state=READY, can="moves by itself, as a toy does")]', "1 / 0"
         ),
     )
-    found = {one.name: one for one in backends()}
-    assert found["toy-hand"].why == (
+    backends_by_name = {backend.name: backend for backend in backends()}
+    assert backends_by_name["toy-hand"].why == (
         "the search for it failed: the plug-in toy_blind 1.0 failed (ZeroDivisionError: division by zero): "
         "update or uninstall the plug-in"
     )
-    assert {"mouse", "falcon", "scripted"} <= set(found)
+    assert {"mouse", "falcon", "scripted"} <= set(backends_by_name)
 
 
 def test_a_probe_that_returns_an_iterator_is_a_fault_of_its_plug_in(site):
@@ -181,6 +181,6 @@ def test_a_probe_that_returns_an_iterator_is_a_fault_of_its_plug_in(site):
             '[Backend("toy-hand", "a string", state=READY, can="moves by itself, as a toy does")]', "iter([])"
         ),
     )
-    found = {one.name: one for one in backends()}
-    assert "toy_once 1.0 failed (probe of device toy-hand returned" in found["toy-hand"].why
-    assert "not a list of Backend" in found["toy-hand"].why
+    backends_by_name = {backend.name: backend for backend in backends()}
+    assert "toy_once 1.0 failed (probe of device toy-hand returned" in backends_by_name["toy-hand"].why
+    assert "not a list of Backend" in backends_by_name["toy-hand"].why

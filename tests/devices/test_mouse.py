@@ -30,7 +30,7 @@ def scene_of(liquid):
     return Scene(liquids=(THESIS[liquid],) if liquid else ())
 
 
-def moved(liquid, pointer, duration_s, *, frame_ms=FRAME_MS):
+def samples_along(liquid, pointer, duration_s, *, frame_ms=FRAME_MS):
     """Return the samples while the pointer goes along x as ``pointer(t)`` says, after the start fade."""
     device = MouseDevice()
     device.point_to(pointer(0.0), 0.0, 0.0)
@@ -44,8 +44,8 @@ def moved(liquid, pointer, duration_s, *, frame_ms=FRAME_MS):
         return reader.read()
 
 
-def pull(t):
-    """From -45 mm at 0.3 m/s, to rest at 35 mm."""
+def pointer_position(t):
+    """Return the pointer's position: from -45 mm at 0.3 m/s to rest at 35 mm."""
     return min(-0.045 + 0.3 * t, 0.035)
 
 
@@ -55,20 +55,20 @@ def behind_ms(samples):
 
 
 def test_in_free_space_the_handle_follows_20_to_30_ms_behind():
-    assert 20 <= behind_ms(moved(None, pull, 1.0, frame_ms=1)) <= 30
+    assert 20 <= behind_ms(samples_along(None, pointer_position, 1.0, frame_ms=1)) <= 30
 
 
 @pytest.mark.parametrize("liquid", LIQUIDS)
 def test_in_a_liquid_it_lags_visibly(liquid):
-    samples = moved(liquid, pull, 0.27)
-    assert behind_ms(samples) > behind_ms(moved(None, pull, 0.27)) + 20
-    pointer = pull(0.25)
+    samples = samples_along(liquid, pointer_position, 0.27)
+    assert behind_ms(samples) > behind_ms(samples_along(None, pointer_position, 0.27)) + 20
+    pointer = pointer_position(0.25)
     assert pointer - samples.position_m[250, 0] > 0.012
     assert np.abs(samples.device_force_n).max() > 3
 
 
 def test_a_wake_carries_it_on_past_the_pointer_and_lets_it_go():
-    samples = moved("light_oil", pull, 2.0)
+    samples = samples_along("light_oil", pointer_position, 2.0)
     beyond = samples.position_m[:, 0] - 0.035
     assert beyond.max() > 0.005
     assert samples.device_force_n[np.argmax(beyond), 0] > 1
@@ -76,7 +76,7 @@ def test_a_wake_carries_it_on_past_the_pointer_and_lets_it_go():
 
 
 def test_without_a_wake_it_is_not_carried_on():
-    assert moved("honey", pull, 2.0).position_m[:, 0].max() < 0.0355
+    assert samples_along("honey", pointer_position, 2.0).position_m[:, 0].max() < 0.0355
 
 
 def test_a_pointer_outside_the_workspace_counts_as_its_border():

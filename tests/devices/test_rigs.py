@@ -1,4 +1,4 @@
-"""A device together with its servo, and the names of devices: what is handed on, in which order, and what is said."""
+"""A device together with its servo, and the names of devices: passed values, order of calls, and messages."""
 
 from dataclasses import replace
 from random import Random
@@ -22,7 +22,7 @@ SETTINGS = RigSettings(
 
 
 class Kept:
-    """An object that keeps in which order its methods were called; one of them may fail."""
+    """An object that records the order of its method calls; one of them may fail."""
 
     def __init__(self, name: str, calls: list[str], fails: str = "") -> None:
         self._name, self._calls, self._fails = name, calls, fails
@@ -42,16 +42,16 @@ class Kept:
 def test_a_rig_is_opened_with_half_the_workspace_and_started_unless_its_clock_is_advanced(
     monkeypatch: pytest.MonkeyPatch, runs: bool | None, starts: bool
 ) -> None:
-    asked: list[Any] = []
+    requests: list[Any] = []
     calls: list[str] = []
     device, clock = Kept("device", calls), None if runs is None else SimpleNamespace(runs=runs)
-    monkeypatch.setattr(rig, "open_device", lambda *words, **named: asked.append((words, named)) or device)
+    monkeypatch.setattr(rig, "open_device", lambda *words, **named: requests.append((words, named)) or device)
     monkeypatch.setattr(
         "study_app.haptics.runtime.servo.Servo",
-        lambda *words, **named: asked.append((words, named)) or Kept("servo", calls),
+        lambda *words, **named: requests.append((words, named)) or Kept("servo", calls),
     )
-    opened = open_rig("pen:7", SETTINGS, clock=clock, progress=print, cancelled=bool)  # type: ignore[arg-type]
-    assert asked == [
+    opened_rig = open_rig("pen:7", SETTINGS, clock=clock, progress=print, cancelled=bool)  # type: ignore[arg-type]
+    assert requests == [
         (
             ("pen:7",),
             {"workspace_m": (0.05, 0.03, 0.02), "force_limit_n": 3.5, "random": DRAWN, "progress": print,
@@ -60,9 +60,9 @@ def test_a_rig_is_opened_with_half_the_workspace_and_started_unless_its_clock_is
         ((device,), {"clock": clock, "rate_hz": 2000.0, "elements": 70}),
     ]  # fmt: skip
     assert calls == ["servo.start"] * starts
-    assert (opened in rig._open_rigs) == starts
-    opened.stop()
-    assert opened not in rig._open_rigs
+    assert (opened_rig in rig._open_rigs) == starts
+    opened_rig.stop()
+    assert opened_rig not in rig._open_rigs
     assert calls == [*["servo.start"] * starts, "servo.stop", "device.close"]
 
 
@@ -76,8 +76,8 @@ def test_a_rig_that_cannot_be_opened_leaves_no_device_open(monkeypatch: pytest.M
     with pytest.raises(DeviceError, match=f"^{said}$"):
         open_rig("pen", SETTINGS, cancelled=lambda: failing == "cancelled")
     assert calls[-1] == "device.close"
-    for opened in tuple(rig._open_rigs):
-        rig._open_rigs.discard(opened)
+    for leftover in tuple(rig._open_rigs):
+        rig._open_rigs.discard(leftover)
 
 
 def test_a_rig_is_stopped_before_its_device_is_closed_and_reopened_at_zero_force() -> None:
@@ -93,7 +93,7 @@ def test_a_rig_is_stopped_before_its_device_is_closed_and_reopened_at_zero_force
 
 
 @needs_servo
-def test_the_settings_of_a_session_are_those_of_its_study(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_settings_of_a_session_follow_from_its_study(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "study_app.haptics.runtime.pack.elements_needed", lambda scene: round(1e6 * scene.liquids[0].density_kg_m3)
     )
@@ -126,7 +126,7 @@ def test_devices_are_listed_with_the_mouse_first_and_simulated_ones_last() -> No
         descriptor_of("mouse:7")
 
 
-def test_a_device_that_needs_an_argument_is_not_listed_by_its_name_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_device_that_needs_an_argument_is_not_listed_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
     bridge = replace(descriptor_of("scripted"), name="bridge", argument="HOST", argument_required=True)
     listed = list_devices()
     monkeypatch.setattr(registry, "all_devices", lambda: (bridge, *all_devices()))
@@ -156,10 +156,10 @@ def test_windows_show_the_options_that_are_for_them_and_a_request_only_the_limit
     )
     device = SimpleNamespace(options=options)
     kind: Any = type(descriptor_of("mouse"))
-    shown = kind.window_options.fget(device)
-    assert [option.name for option in shown] == ["port", "tip"]
+    window_options = kind.window_options.fget(device)
+    assert [option.name for option in window_options] == ["port", "tip"]
     values = {"port": "7", "trace": "on"}
-    assert kind.window_values(SimpleNamespace(window_options=shown), values) == {"port": "7"}
+    assert kind.window_values(SimpleNamespace(window_options=window_options), values) == {"port": "7"}
     assert OpenRequest().limits == {}
     assert OpenRequest(force_limit_n=2.0).limits == {"force_limit_n": 2.0}
     both = OpenRequest(workspace_m=(0.1, 0.2, 0.3), force_limit_n=2.0).limits

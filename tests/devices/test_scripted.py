@@ -26,17 +26,17 @@ class Hand(Ticks):
 
     def aims(self, ticks):
         """Return (ticks, 3) aims of the hand after each tick of 1 ms."""
-        return self.seen(ticks, lambda: self.device.aim_m)
+        return self.record(ticks, lambda: self.device.aim_m)
 
     def places(self, ticks):
         """Return (ticks, 3) positions as measured."""
-        return self.seen(ticks, lambda: self.position_m)
+        return self.record(ticks, lambda: self.position_m)
 
-    def seen(self, ticks, what):
+    def record(self, ticks, read_value):
         rows = []
         for _ in range(ticks):
             self.read()
-            rows.append(what())
+            rows.append(read_value())
         return np.array(rows)
 
 
@@ -45,9 +45,9 @@ def test_a_motion_is_followed_along_straight_lines_on_the_devices_clock():
     t_s = [5.0, 5.1, 5.25, 5.6]  # wherever it begins
     places = np.array([[0, 0, 0], [0.02, 0, -0.01], [0.02, 0.03, 0], [-0.01, 0, 0.01]])
     hand.device.follow(t_s, places)
-    seen = hand.aims(700)
+    aims = hand.aims(700)
     t = np.minimum(5.0 + np.arange(700) * 1e-3, 5.6)
-    assert seen == pytest.approx(np.column_stack([np.interp(t, t_s, places[:, axis]) for axis in range(3)]), abs=1e-12)
+    assert aims == pytest.approx(np.column_stack([np.interp(t, t_s, places[:, axis]) for axis in range(3)]), abs=1e-12)
     assert not hand.device.moving
     hand.device.follow([0.0], [[0.01, 0.02, 0.03]])
     assert hand.aims(3)[-1].tolist() == [0.01, 0.02, 0.03]
@@ -87,7 +87,7 @@ def test_an_order_that_is_half_written_is_left_for_later():
         ([0, 1], np.full((2, 3), np.inf), "finite"),
     ],
 )
-def test_a_motion_that_is_none_is_refused(t_s, position_m, message):
+def test_an_invalid_motion_is_refused(t_s, position_m, message):
     with pytest.raises(DeviceError, match=message):
         ScriptedDevice().follow(t_s, position_m)
 
@@ -97,12 +97,12 @@ def test_a_reach_is_of_minimum_jerk():
     hand.device.hold(-0.03, 0.0, 0.01)
     hand.read()
     hand.device.reach_to(0.03, 0.02, 0.01, duration_s=0.5)
-    seen = hand.aims(700)
+    aims = hand.aims(700)
     share = np.minimum(np.arange(700) / 500, 1)[:, None]
-    done = 10 * share**3 - 15 * share**4 + 6 * share**5
+    progress = 10 * share**3 - 15 * share**4 + 6 * share**5
     start, end = np.array([-0.03, 0, 0.01]), np.array([0.03, 0.02, 0.01])
-    assert seen == pytest.approx(start + done * (end - start), abs=1e-12)
-    speed = np.linalg.norm(np.diff(seen, axis=0), axis=1).max() * 1e3
+    assert aims == pytest.approx(start + progress * (end - start), abs=1e-12)
+    speed = np.linalg.norm(np.diff(aims, axis=0), axis=1).max() * 1e3
     assert speed == pytest.approx(1.875 * np.linalg.norm(end - start) / 0.5, rel=1e-3)
     assert not hand.device.moving
     with pytest.raises(DeviceError, match="longer than 0 s, not 0"):
@@ -144,16 +144,16 @@ def test_tremor_is_below_a_millimetre_and_between_8_and_12_hz():
     assert power[(hertz > 7.5) & (hertz < 12.5)].sum() > 0.95 * power.sum()
 
 
-def trembling(random):
+def trembling_hand(random):
     hand = Hand(ScriptedDevice(random))
     hand.device.reach_to(0.03, 0.02, 0.01)
     return hand.places(500)
 
 
 def test_the_same_seed_is_the_same_hand_to_the_bit_and_another_is_not():
-    assert np.array_equal(trembling(Random(7)), trembling(Random(7)))  # noqa: S311
-    assert not np.array_equal(trembling(Random(7)), trembling(Random(8)))  # noqa: S311
-    assert np.array_equal(trembling(None), trembling(None))
+    assert np.array_equal(trembling_hand(Random(7)), trembling_hand(Random(7)))  # noqa: S311
+    assert not np.array_equal(trembling_hand(Random(7)), trembling_hand(Random(8)))  # noqa: S311
+    assert np.array_equal(trembling_hand(None), trembling_hand(None))
 
 
 def plain_wave(turn):
@@ -163,7 +163,7 @@ def plain_wave(turn):
 
 
 def test_the_hand_moves_to_the_same_bits_as_plain_ieee_arithmetic():
-    """So no machine's fused multiplication or sine can make it another hand."""
+    """Otherwise a machine's fused multiplication or sine could change the hand."""
     target = (0.03, 0.02, 0.01)
     hand = Hand(ScriptedDevice(Random(7)))  # noqa: S311
     state = hand.device.state.hand
@@ -175,12 +175,12 @@ def test_the_hand_moves_to_the_same_bits_as_plain_ieee_arithmetic():
     for _ in range(600):
         hand.read()
         share = min((hand.now_ns - began_ns) * 1e-9 * 1e9 / duration_ns, 1.0)
-        done = share * share * share * (10.0 + share * (6.0 * share - 15.0))
+        progress = share * share * share * (10.0 + share * (6.0 * share - 15.0))
         for axis in range(3):
             offset = 0.0
             for hertz, turn in zip(state.tremor_hz[axis], state.tremor_turn[axis], strict=True):
                 offset += plain_wave(hertz * (hand.now_ns * 1e-9) + turn)
-            assert state.place_m[axis] == 0.0 + done * (target[axis] - 0.0) + TREMOR_M * offset
+            assert state.place_m[axis] == 0.0 + progress * (target[axis] - 0.0) + TREMOR_M * offset
 
 
 @settings(deadline=None)

@@ -9,12 +9,12 @@ SECONDS = 60.0
 
 
 @pytest.mark.parametrize("name", ["inverse3", "falcon", "force-dimension"])
-def test_a_minute_of_stops_under_painting_windows_loses_none(qapp: object, name: str) -> None:
+def test_no_stop_is_lost_in_a_minute_under_painting_windows(qapp: object, name: str) -> None:
     from tests.benchmarks.devices.stops import under_windows
 
-    found = under_windows(name, SECONDS)
-    assert found.lost == []
-    assert found.faults == []
-    assert found.stops > 30
-    assert found.under_force > 0.8 * found.stops
-    assert found.frames > 10 * SECONDS
+    result = under_windows(name, SECONDS)
+    assert result.lost == []
+    assert result.faults == []
+    assert result.stops > 30
+    assert result.under_force > 0.8 * result.stops
+    assert result.frames > 10 * SECONDS

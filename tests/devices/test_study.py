@@ -35,7 +35,7 @@ FOLLOW = HandOrders.follow
 
 
 def tie_hand(patch: pytest.MonkeyPatch) -> None:
-    """Let no force move the simulated hand off its path at the handle."""
+    """Tie the simulated hand to its path, so that no force moves it."""
     patch.setattr(scripted, "STIFFNESS_NPM", 1e6)
     patch.setattr(scripted, "DAMPING_NSPM", 2e3)
 
@@ -99,21 +99,21 @@ def test_the_study_verifies_and_its_receipt_names_the_device(rehearsed: Rehearse
     receipt = json.loads(folder.sessions()[0].receipt.read_text("utf-8"))["device"]
     assert receipt["name"] == rehearsed.device
     assert receipt.items() >= RECEIPTS[rehearsed.device].items()
-    for one in (rehearsed.by_script, folder):
-        trials = table(one, "trials")
+    for study_folder in (rehearsed.by_script, folder):
+        trials = table(study_folder, "trials")
         assert {(row["valid"], row["simulated"], row["outcome"]) for row in trials} == {("true", "true", "complete")}
 
 
-def test_mean_forces_are_those_of_the_path_trial_by_trial(rehearsed: Rehearsed) -> None:
-    """A single tick differs as much as encoders of a finite count make it."""
+def test_mean_forces_of_each_trial_equal_those_of_the_path(rehearsed: Rehearsed) -> None:
+    """Single ticks differ because of the encoders' finite counts."""
     rows, others = (table(folder, "trials") for folder in (rehearsed.by_script, rehearsed.by_device))
     for row, other in zip(rows, others, strict=True):
         force_n = float(row["force_mean_n"])
         assert float(other["force_mean_n"]) == pytest.approx(force_n, abs=max(0.05 * force_n, 0.05))
 
 
-def felt(device: Any, scene: Any, lasting_s: float, given_n: list[Any] | None = None) -> Any:
-    """Return all samples of a device whose hand explores a scene; ``given_n`` gets what its motors give each tick."""
+def explored_samples(device: Any, scene: Any, lasting_s: float, given_n: list[Any] | None = None) -> Any:
+    """Return all samples of a device whose hand explores a scene; append the force of its motors to ``given_n``."""
     from study_app.haptics.runtime.clocks import VirtualClock
     from study_app.haptics.runtime.servo import Servo
 
@@ -141,39 +141,39 @@ def emulated_falcon(**options: Any) -> Any:
     return EmulatedFalcon(emulator=Emulator(running=True, workspace_m=HALF_M, **options))
 
 
-def test_in_a_thick_liquid_the_force_is_that_of_the_path_all_along(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Averaged over 10 ms, which no hand tells apart, within 5 % or 0.05 N of what the exact path is felt as.
+def test_in_a_thick_liquid_the_force_equals_that_of_the_path_throughout(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Averages over 10 ms are within 5 % or 0.05 N of the force of the exact path.
 
     Windows with a rejected sample do not count: the path sets out faster than a hand, so the exact device rejects it.
     """
     tie_hand(monkeypatch)
     scene = load(STUDY).scene_for("honey")
-    exact = felt(scripted.ScriptedDevice(quantum_m=0.0, tremor_m=0.0, workspace_m=HALF_M), scene, 20.0)
+    exact = explored_samples(scripted.ScriptedDevice(quantum_m=0.0, tremor_m=0.0, workspace_m=HALF_M), scene, 20.0)
     with emulated_falcon(tremor_m=0.0) as device:
-        coarse = felt(device, scene, 20.0)
+        coarse = explored_samples(device, scene, 20.0)
     window = np.ones(10) / 10
-    one, other = (
+    exact_n, coarse_n = (
         np.stack([np.convolve(rows["device_force_n"][:, axis], window, "valid") for axis in range(3)], axis=1)
         for rows in (exact, coarse)
     )
-    off_n, size_n = np.linalg.norm(other - one, axis=1), np.linalg.norm(one, axis=1)
+    off_n, size_n = np.linalg.norm(coarse_n - exact_n, axis=1), np.linalg.norm(exact_n, axis=1)
     rejected = (exact["limiters"] | coarse["limiters"]) & LIMITER_GLITCH != 0
     assert rejected.sum() <= 10
-    counted = np.convolve(rejected, window, "valid") == 0
-    assert size_n[counted].max() > 4.0
-    assert (off_n <= np.maximum(0.05 * size_n, 0.05))[counted].all()
+    compared = np.convolve(rejected, window, "valid") == 0
+    assert size_n[compared].max() > 4.0
+    assert (off_n <= np.maximum(0.05 * size_n, 0.05))[compared].all()
 
 
 @pytest.mark.parametrize("condition", ["water", "honey"])
-def test_a_minute_with_faulty_packets_has_no_jump_of_force_and_no_tick_unaccounted_for(condition: str) -> None:
+def test_faulty_packets_cause_neither_force_jumps_nor_uncounted_ticks(condition: str) -> None:
     faults = ("drop", "truncate", "corrupt", "duplicate")
     given_n: list[Any] = []
     with emulated_falcon(random=Random(5)) as device:  # noqa: S311
         for fault in faults:
             device.hand.faults.chance(fault, 0.0025)
-        samples = felt(device, load(STUDY).scene_for(condition), 60.0, given_n)
+        samples = explored_samples(device, load(STUDY).scene_for(condition), 60.0, given_n)
         counters = device.counters
-        happened = {fault: device.hand.faults.happened(fault) for fault in faults}
+        happened = {fault: device.hand.faults.occurrences(fault) for fault in faults}
     assert (samples["status"] == STATUS_OK).all()
     most_n = slew_limit_n(1e-3, device.dynamics)
     for forces_n in (samples["device_force_n"], np.array(given_n)):  # asked for, and made of it by the emulator

@@ -43,7 +43,7 @@ int main(void) {{
 """
 
 
-def printed(names: tuple[str, ...], of: str) -> str:
+def print_statement(names: tuple[str, ...], of: str) -> str:
     return ' printf(", "); '.join(f"FIELD({of}, {name});" for name in names)
 
 
@@ -65,7 +65,7 @@ def test_header_and_numpy_records_have_the_same_offsets_sizes_and_constants(tmp_
     exchange = np.dtype(driver.COMMON, align=True)
     records = {"reading": layout.READING, "command": layout.COMMAND, "exchange": exchange}
     text = OFFSETS.format(
-        **{name: printed(dtype.names, f"liquid_study_{name}") for name, dtype in records.items()},
+        **{name: print_statement(dtype.names, f"liquid_study_{name}") for name, dtype in records.items()},
         constants=' printf(", "); '.join(f'printf("\\"{name}\\": %d", LIQUID_STUDY_{name});' for name in constants),
     )
     (tmp_path / "offsets.c").write_text(text, encoding="utf-8", newline="\n")
@@ -74,17 +74,17 @@ def test_header_and_numpy_records_have_the_same_offsets_sizes_and_constants(tmp_
     subprocess.run(
         [COMPILER, "-std=c11", "-Wall", "-Werror", include, program.with_suffix(".c"), "-o", program], check=True
     )
-    found = json.loads(subprocess.run([program], capture_output=True, text=True, check=True).stdout)
+    offsets = json.loads(subprocess.run([program], capture_output=True, text=True, check=True).stdout)
     for name, dtype in records.items():
-        assert found[name] == {
+        assert offsets[name] == {
             field: [dtype.fields[field][1], dtype.fields[field][0].itemsize] for field in dtype.names
         }
-    assert found["sizes"] == [layout.READING.itemsize, layout.COMMAND.itemsize]
-    assert found["constants"] == constants
+    assert offsets["sizes"] == [layout.READING.itemsize, layout.COMMAND.itemsize]
+    assert offsets["constants"] == constants
 
 
 def maker_force_n(loaded: ctypes.CDLL) -> list[float]:
-    """Return what the motors give."""
+    """Return the force of the motors."""
     force = (ctypes.c_double * 3)()
     loaded.maker_force_now(force)
     return list(force)
@@ -133,7 +133,7 @@ class TestTemplate:
         assert power_w.mean() < 0.0
 
     def test_force_ends_where_the_servo_is_silent(self):
-        """The library's own thread goes on without the servo: a hang of ours must not hold a force."""
+        """The library's own thread continues without the servo: a hang of this program must not hold a force."""
         with open_device("example-mailbox") as device:
             from liquid_study_example.driver import library
 

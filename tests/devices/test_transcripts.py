@@ -1,4 +1,4 @@
-"""What each device says of itself and answers tick by tick, what can go wrong with a Falcon, and descriptors."""
+"""Descriptions of each device, its answers tick by tick, failure modes of a Falcon, and descriptors."""
 
 import pickle
 from pathlib import Path
@@ -14,22 +14,22 @@ from tests.golden_values import value_lines
 GOLDEN = Path(__file__).parent / "golden"
 
 
-def test_what_can_go_wrong_with_a_falcon(pytestconfig: pytest.Config) -> None:
-    told = list[str]()
+def test_failure_modes_of_a_falcon(pytestconfig: pytest.Config) -> None:
+    lines = list[str]()
     for platform in ("linux", "win32", "darwin"):
         table = failures_on(platform)
         ids = [mode.id for mode in table.modes]
         reports = [Report((), table.findings({mode}, table.before(mode)), table.sentence(mode)) for mode in ids]
-        told += [f"{platform}: {' '.join(ids)}", *(line for one in reports[::4] for line in report_lines(one))]
+        lines += [f"{platform}: {' '.join(ids)}", *(line for report in reports[::4] for line in report_lines(report))]
         assert pickle.loads(pickle.dumps(reports)) == reports  # noqa: S301 - of the worker
-        told += report_lines(Report(("a Falcon",), table.findings(ids, ids), None))
-    compare(GOLDEN / "falcon_failures.txt", each_once(told), pytestconfig)
+        lines += report_lines(Report(("a Falcon",), table.findings(ids, ids), None))
+    compare(GOLDEN / "falcon_failures.txt", each_once(lines), pytestconfig)
 
 
 def test_descriptors(pytestconfig: pytest.Config) -> None:
-    told = list[str]()
-    for one in all_devices():
-        name = one.name
-        values = one.window_values({"firmware": "/f.bin", "dhd-library": "/l.so", "nothing": "x"})
-        told += [*value_lines(one, name), f"{name}: {one.label} {dict(values)}"]
-    compare(GOLDEN / "descriptors.txt", each_once(told), pytestconfig)
+    lines = list[str]()
+    for device in all_devices():
+        name = device.name
+        values = device.window_values({"firmware": "/f.bin", "dhd-library": "/l.so", "nothing": "x"})
+        lines += [*value_lines(device, name), f"{name}: {device.label} {dict(values)}"]
+    compare(GOLDEN / "descriptors.txt", each_once(lines), pytestconfig)

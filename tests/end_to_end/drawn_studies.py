@@ -35,7 +35,7 @@ METHODS: tuple[Table, ...] = (
 
 
 def drawn(number: int) -> tuple[str, Protocol]:
-    """Return the text of the random study of this number, and what it is read as."""
+    """Return the text of the random study of this number, and its protocol."""
     for attempt in count():
         text = tomlkit.dumps(_Drawing(random.Random(f"{number}/{attempt}")).study())  # noqa: S311 - of a test
         try:
@@ -46,7 +46,7 @@ def drawn(number: int) -> tuple[str, Protocol]:
 
 
 class _Drawing:
-    """One study while it is drawn."""
+    """The state of one random study while it is drawn."""
 
     def __init__(self, rng: random.Random) -> None:
         self.rng = rng
@@ -66,19 +66,23 @@ class _Drawing:
 
     def study(self) -> Table:
         """Return the whole file."""
-        found, rng = self.found, self.rng
-        found["tasks"] = {"move": self._task()}
-        found["questionnaires"] = {
+        drawn_study, rng = self.found, self.rng
+        drawn_study["tasks"] = {"move": self._task()}
+        drawn_study["questionnaires"] = {
             name: self._questionnaire(name) for name in ("after", "other", "before", "last")[: rng.randint(1, 4)]
         }
         if self.languages == ["en"]:
-            found["questionnaires"]["standard"] = {"instrument": rng.choice(INSTRUMENTS)}
-        found["pages"] = {"hello": self._page("consent"), "bye": self._page("debrief"), "rest": self._page("break")}
-        found["blocks"] = {f"b{number}": self._block(number) for number in range(1, rng.randint(1, 4) + 1)}
+            drawn_study["questionnaires"]["standard"] = {"instrument": rng.choice(INSTRUMENTS)}
+        drawn_study["pages"] = {
+            "hello": self._page("consent"),
+            "bye": self._page("debrief"),
+            "rest": self._page("break"),
+        }
+        drawn_study["blocks"] = {f"b{number}": self._block(number) for number in range(1, rng.randint(1, 4) + 1)}
         self._break()
         self._order()
         self._decide()
-        return {name: table for name, table in found.items() if table}
+        return {name: table for name, table in drawn_study.items() if table}
 
     def _text(self, words: str) -> str | Table:
         return words if len(self.languages) == 1 else {name: f"{words} ({name})" for name in self.languages}
@@ -112,10 +116,10 @@ class _Drawing:
         for earlier, later in pairwise(items):
             if self.rng.random() < 0.3:
                 later["show_if"] = {"item": earlier["id"], **self._condition(earlier)}
-        numbers = [one["id"] for one in items if one.get("kind", "rating") in ("rating", "slider", "number")]
+        numbers = [item["id"] for item in items if item.get("kind", "rating") in ("rating", "slider", "number")]
         if numbers and self.rng.random() < 0.3:
             table["scores"] = {f"{name}_score": {"items": numbers, "reverse": numbers[:1], "combine": "mean"}}
-        if not any("show_if" in one for one in items):
+        if not any("show_if" in item for item in items):
             table["item_order"] = self.rng.choice(["fixed", "shuffled"])
         return table
 
@@ -128,8 +132,11 @@ class _Drawing:
                 {"kind": "slider", "low": self._text("Low"), "high": self._text("High"), "step": 5},
                 {"kind": "number", "from": 1, "to": 9, "whole": True, "unit": self._text("years")},
                 {"kind": "number"},
-                {"kind": "choice", "options": [{"id": one, "text": self._text(one)} for one in ("left", "right")]},
-                {"kind": "choice", "options": [{"id": one, "text": self._text(one)} for one in ("red", "blue")]}
+                {"kind": "choice", "options": [{"id": end, "text": self._text(end)} for end in ("left", "right")]},
+                {
+                    "kind": "choice",
+                    "options": [{"id": colour, "text": self._text(colour)} for colour in ("red", "blue")],
+                }
                 | {"several": True},
                 {"kind": "text"},
             ]
@@ -144,16 +151,23 @@ class _Drawing:
         return {"is": "nothing"} if kind == "text" else {"at_least": 4}
 
     def _block(self, number: int) -> Table:
-        kinds = [self._presenting, self._presenting, self._comparing, self._varying, self._varying, self._judging]
-        made: Table = self.rng.choice(kinds if number == 1 else [*kinds, self._practising])(f"b{number}")
-        return made | ({"title": self._text(f"Block {number}")} if self.rng.random() < 0.5 else {})
+        kinds = [
+            self._presentation_block,
+            self._presentation_block,
+            self._comparison_block,
+            self._level_block,
+            self._level_block,
+            self._judging,
+        ]
+        block: Table = self.rng.choice(kinds if number == 1 else [*kinds, self._practice_block])(f"b{number}")
+        return block | ({"title": self._text(f"Block {number}")} if self.rng.random() < 0.5 else {})
 
     def _conditions(self, least: int) -> list[str]:
         groups = (["thin", "thick", "tar"], ["thick", "late_50", "late_100", "late_200"])
         names = self.rng.choice(groups)
         return self.rng.sample(names, self.rng.randint(least, len(names)))
 
-    def _presenting(self, _name: str) -> Table:
+    def _presentation_block(self, _name: str) -> Table:
         conditions = self._conditions(1) if self.rng.random() < 0.9 else ["thick", "blind"]
         order = self.rng.choice(["fixed", "shuffled", "constrained", "williams", "latin"])
         block = {"conditions": conditions, "order": order, "repetitions": self.rng.randint(1, 2)}
@@ -163,18 +177,18 @@ class _Drawing:
             block["questionnaire"] = self.rng.choice(sorted(self.found["questionnaires"]))
         return block
 
-    def _practising(self, _name: str) -> Table:
+    def _practice_block(self, _name: str) -> Table:
         phase = self.rng.choice(["practice", "baseline"])
         block = {"phase": phase, "conditions": [self.rng.choice(sorted(self.found["conditions"]))]}
         return block | ({"questionnaire": "after"} if self.rng.random() < 0.5 else {})
 
-    def _comparing(self, name: str) -> Table:
-        """Compare conditions with one of them."""
+    def _comparison_block(self, name: str) -> Table:
+        """Return a block that compares conditions with one of them."""
         conditions = self._conditions(2)
         block: Table = {"conditions": conditions, "standard": conditions[0], "repetitions": 2}
         return block | {"design": self._design(name, {"kind": self.rng.choice(COMPARING)})} | self._practice()
 
-    def _varying(self, name: str) -> Table:
+    def _level_block(self, name: str) -> Table:
         """Compare levels of a number with standards, by any method."""
         vary = self.rng.choice(sorted(VARIED))
         self._stimulus(name, {"vary": vary, "condition": "thick", **VARIED[vary]})
@@ -228,26 +242,26 @@ class _Drawing:
 
     def _order(self) -> None:
         """List the steps: for all, for each session, for each group, or for each session of a group."""
-        found, rng = self.found, self.rng
-        forms = [name for name in found["questionnaires"] if name in ("before", "last", "standard")]
-        steps = ["hello", *forms[:1], *found["blocks"], *forms[1:], "bye"]
+        drawn_study, rng = self.found, self.rng
+        forms = [name for name in drawn_study["questionnaires"] if name in ("before", "last", "standard")]
+        steps = ["hello", *forms[:1], *drawn_study["blocks"], *forms[1:], "bye"]
         if rng.random() < 0.5:
             steps.insert(rng.randint(1, len(steps)), "rest")
-        blocks = list(found["blocks"])
+        blocks = list(drawn_study["blocks"])
         orders = [steps, [*blocks[::-1], "bye"], blocks[1:] or blocks, ["hello", *blocks[:1], "rest"]]
         way = rng.choice(["omitted", "all", "sessions", "groups", "groups", "sessions of groups", "mixed"])
         if way == "omitted":
-            found["pages"] = {"rest": found["pages"]["rest"]}
+            drawn_study["pages"] = {"rest": drawn_study["pages"]["rest"]}
         elif way == "all":
-            found["sequence"] = steps
+            drawn_study["sequence"] = steps
         elif way == "sessions":
-            found["sequences"] = [steps, rng.choice(orders)]
+            drawn_study["sequences"] = [steps, rng.choice(orders)]
         else:
-            found["groups"] = self._groups(way, steps, orders)
+            drawn_study["groups"] = self._groups(way, steps, orders)
             if way == "mixed":
-                found["sequence"] = steps
-        if not any("rest" in listed for _, listed in sequences_in(frozen(found))) and not self._breaks():
-            del found["pages"]["rest"]
+                drawn_study["sequence"] = steps
+        if not any("rest" in listed for _, listed in sequences_in(frozen(drawn_study))) and not self._breaks():
+            del drawn_study["pages"]["rest"]
 
     def _breaks(self) -> bool:
         return any("break_page" in block for block in self.found["blocks"].values())

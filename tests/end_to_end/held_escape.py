@@ -53,7 +53,7 @@ application.exec()
 
 
 class Counts(NamedTuple):
-    """How often the force was stopped, how often it was restored, and how often the session paused without a stop."""
+    """Counts of stopped forces, of restored forces, and of pauses without a stop."""
 
     stopped: int
     restored: int

@@ -26,7 +26,7 @@ needs_display = pytest.mark.skipif(bool(MISSING), reason=f"not installed here: {
 
 @contextmanager
 def virtual_display(*more: str, size: tuple[int, int] = (1920, 1080)) -> Iterator[str]:
-    """A virtual X display that nobody else uses, of a size [px]; ``more`` is said to its server.
+    """A private virtual X display of a size [px]; ``more`` are arguments of its server.
 
     It does not begin anew with every last client that goes: that would turn away one that is just coming.
     """
@@ -62,7 +62,7 @@ def new_session(window: QWidget) -> Any:
 
 
 class Program:
-    """The program as a person meets it: windows, keys, a mouse, and files that appear."""
+    """The running program with its windows and files, driven by keys and mouse."""
 
     def __init__(
         self, display: str, folder: Path, *arguments: str, program: tuple[str, str] = ("-m", "study_app")
@@ -91,34 +91,34 @@ class Program:
         return finished.stdout.strip()
 
     def window(self, title: str) -> str:
-        found: list[str] = []
+        titles: list[str] = []
 
         def look() -> list[str]:
             assert self.process.poll() is None, f"{self.process.returncode} {self.process.stderr.read()}"  # type: ignore[union-attr]
-            found[:] = self.xdotool("search", "--onlyvisible", "--name", title).splitlines()
-            return found
+            titles[:] = self.xdotool("search", "--onlyvisible", "--name", title).splitlines()
+            return titles
 
         wait_for(look, f"the window {title!r}")
-        return found[-1]
+        return titles[-1]
 
     def window_of(self, title: str, size: QSize) -> str:
         """Wait for a window of this title and size; return its number."""
-        found: list[str] = []
+        windows: list[str] = []
 
         def look() -> list[str]:
             assert self.process.poll() is None, f"{self.process.returncode} {self.process.stderr.read()}"  # type: ignore[union-attr]
-            found[:] = [one for one in self.windows(title) if QSize(*self.size(one)) == size]
-            return found
+            windows[:] = [window for window in self.windows(title) if QSize(*self.size(window)) == size]
+            return windows
 
         wait_for(look, f"the window {title!r}", COMPILED_S)
-        return found[-1]
+        return windows[-1]
 
     def windows(self, title: str) -> list[str]:
         """Return the windows of this title that are seen."""
         return self.xdotool("search", "--onlyvisible", "--name", title).split()
 
     def size(self, window: str) -> tuple[int, int]:
-        """Return width and height, 0 of a window that has just gone."""
+        """Return width and height, or 0 if the window has just closed."""
         geometry = dict(
             line.split("=") for line in self.xdotool("getwindowgeometry", "--shell", window).splitlines() if "=" in line
         )
@@ -144,9 +144,9 @@ class Program:
         self.xdotool("windowfocus", "--sync", window, "key", "--clearmodifiers", *keys)
 
     def events(self, kind: str) -> list[dict[str, object]]:
-        """Return what the journal of the only session tells of a kind."""
-        found = list(self.folder.glob("results/*/data/sub-*/ses-01/journal.jsonl"))
-        whole = found[0].read_bytes().rpartition(b"\n")[0].splitlines() if found else []
+        """Return the events of a kind in the journal of the only session."""
+        journals = list(self.folder.glob("results/*/data/sub-*/ses-01/journal.jsonl"))
+        whole = journals[0].read_bytes().rpartition(b"\n")[0].splitlines() if journals else []
         return [event for event in map(json.loads, whole) if event["event"] == kind]
 
     def wait_for_event(self, kind: str, count: int = 1) -> None:

@@ -59,16 +59,18 @@ def run(
     study: Protocol, store: SessionStore, kept: SimulatedStore, felt: ConditionFeatures, passed: SimulatedTime
 ) -> None:
     """Answer a session from where its journal ends."""
-    begun = store.lines[0]
-    own = session_protocol(store.place.study_folder, store.as_recorded(study), begun.participant, begun.session)
-    schedule = build_schedule(own, begun.participant, begun.seed)
+    start_line = store.lines[0]
+    own = session_protocol(
+        store.place.study_folder, store.as_recorded(study), start_line.participant, start_line.session
+    )
+    schedule = build_schedule(own, start_line.participant, start_line.seed)
     start = resume_at(own, schedule, store.lines, store.key)
-    state = initial_state(own, schedule, store.key.codes, begun.language, start, store.key.nonce)
+    state = initial_state(own, schedule, store.key.codes, start_line.language, start, store.key.nonce)
     Answering(study, state, kept, passed, lambda block, condition: felt[block, condition]).run()
 
 
 def cut_off_and_resumed(study: Protocol, source: bytes, results: Path, felt: ConditionFeatures, seed: int) -> None:
-    """Hold one more session in a study folder: its program ends at a random line, and another goes on with it."""
+    """Run a session in a study folder whose program ends at a random line, and resume it."""
     rng = random.Random(seed)  # noqa: S311 - of a test
     language = rng.choice(study.study.languages)
     who = {"seed": seed, "language": language, "device": DEVICE, "screens": REHEARSED_SCREENS, "simulated": True}
@@ -88,15 +90,15 @@ def cut_off_and_resumed(study: Protocol, source: bytes, results: Path, felt: Con
 
 def check_outputs(study: Protocol, results: Path, to: Path) -> None:
     """Check that results are sound, exported and, if anything was asked, reported, and that no trouble is told."""
-    said: list[str] = []
+    messages: list[str] = []
     assert verify_study(results).errors == ()
-    assert export(results, to, warn=said.append, failed=said.append)
+    assert export(results, to, warn=messages.append, failed=messages.append)
     if study.forms or any(study.questionnaire_of(block.id) for block in study.main_blocks):
-        assert report(results, to, warn=said.append, failed=said.append)
+        assert report(results, to, warn=messages.append, failed=messages.append)
     else:
         with pytest.raises(AnalysisError, match="there is nothing to report"):
             report(results, to)
-    assert said == []
+    assert messages == []
 
 
 @pytest.mark.variants(6)
@@ -105,9 +107,9 @@ def test_any_accepted_study_can_be_held_resumed_verified_exported_and_reported(n
     text, study = drawn(number)
     file, results = tmp_path / "drawn.toml", tmp_path / "results"
     file.write_text(text, encoding="utf-8", newline="\n")
-    felt = made_up(str(file))
-    rehearse_answers(file, participants=2, seed=number, results=results, features=felt)
-    cut_off_and_resumed(study, file.read_bytes(), results, felt, number)
+    features = made_up(str(file))
+    rehearse_answers(file, participants=2, seed=number, results=results, features=features)
+    cut_off_and_resumed(study, file.read_bytes(), results, features, number)
     for session in StudyFolder(results).sessions():
         assert reproduce_session(session.path).differences == []
     if number % 2:

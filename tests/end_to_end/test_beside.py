@@ -28,7 +28,7 @@ pytestmark = pytest.mark.slow
 
 
 class Stepwise:
-    """Takes the lines of a session, each when it is let."""
+    """A session store that writes each line only when permitted."""
 
     def __init__(self, store: SessionStore) -> None:
         self.store, self.ended = store, threading.Event()
@@ -58,32 +58,35 @@ def test_a_report_beside_a_running_session_is_of_the_sessions_that_ended_and_dis
     study, passed, features = load("demo"), SimulatedTime(), made_up("demo")
     who = {"seed": 3, "device": DEVICE, "screens": REHEARSED_SCREENS, "simulated": True}
     with begun(results, "P003", clock=SessionClock(passed.ns), **who) as store:
-        kept, schedule = Stepwise(store), build_schedule(study, "P003", 3)
+        stepwise, schedule = Stepwise(store), build_schedule(study, "P003", 3)
         state = initial_state(study, schedule, store.key.codes, "en", secret=store.key.nonce)
-        answering = Answering(study, state, kept, passed, lambda block, condition: features[block, condition])
+        answering = Answering(study, state, stepwise, passed, lambda block, condition: features[block, condition])
         session = threading.Thread(target=answering.run)
         session.start()
-        kept.write(10)
+        stepwise.write(10)
         steps: list[str] = []
 
         def go_on(what: str, _share: float) -> None:
             steps.append(what)
-            kept.write(3)
+            stepwise.write(3)
 
-        said: list[str] = []
-        report(results, tmp_path / "beside", progress=go_on, warn=said.append, failed=said.append)
-        assert said == []
+        messages: list[str] = []
+        report(results, tmp_path / "beside", progress=go_on, warn=messages.append, failed=messages.append)
+        assert messages == []
         assert len(steps) > 3
-        assert not kept.ended.is_set()
-        kept.write(10_000)
+        assert not stepwise.ended.is_set()
+        stepwise.write(10_000)
         session.join(30)
     assert verify_study(results).errors == ()
-    report(results, tmp_path / "after", warn=said.append, failed=said.append)
-    assert said == []
+    report(results, tmp_path / "after", warn=messages.append, failed=messages.append)
+    assert messages == []
     reports = [json.loads((tmp_path / name / "report.json").read_bytes()) for name in ("beside", "after")]
-    assert [(one["study"]["participants"], one["study"]["sessions_left_out"]) for one in reports] == [(2, 1), (3, 0)]
-    for told, status in zip(reports, ("unfinished", "completed"), strict=True):
-        assert [one["status"] for one in told["sessions"]] == ["completed", "completed", status]
+    assert [(report["study"]["participants"], report["study"]["sessions_left_out"]) for report in reports] == [
+        (2, 1),
+        (3, 0),
+    ]
+    for report_content, status in zip(reports, ("unfinished", "completed"), strict=True):
+        assert [session["status"] for session in report_content["sessions"]] == ["completed", "completed", status]
 
 
 def test_a_draft_that_release_0_2_left_is_shown_at_home_and_opened_in_the_designer(
@@ -116,9 +119,9 @@ def test_a_draft_that_release_0_2_left_is_shown_at_home_and_opened_in_the_design
     qtbot.mouseClick(first.pen, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.editing.opened is not None, timeout=20_000)
     assert visit.designer is not None
-    opened = visit.designer.editing.opened
-    assert opened is not None
-    assert opened.study.document["study"]["title"] == "A second look"
+    opened_draft = visit.designer.editing.opened
+    assert opened_draft is not None
+    assert opened_draft.study.document["study"]["title"] == "A second look"
     assert file.read_bytes() == saved
     visit.window.close()
     visit.end()

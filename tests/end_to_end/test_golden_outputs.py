@@ -68,19 +68,21 @@ def test_aggregates_are_those_of_the_responses(outputs: Path) -> None:
     )
     for row in aggregates.to_dict("records"):
         same = (responses["code"] == row["code"]) & (responses["item"] == row["item"])
-        found = responses[same & (responses["block"] == row["block"]) & responses["counted"]]["response"].dropna()
-        assert row["n"] == len(found)
-        assert [row[f"count_{answer}"] for answer in range(1, 8)] == [(found == answer).sum() for answer in range(1, 8)]
-        quartiles = found.quantile([0.25, 0.5, 0.75]).tolist()
+        values = responses[same & (responses["block"] == row["block"]) & responses["counted"]]["response"].dropna()
+        assert row["n"] == len(values)
+        assert [row[f"count_{answer}"] for answer in range(1, 8)] == [
+            (values == answer).sum() for answer in range(1, 8)
+        ]
+        quartiles = values.quantile([0.25, 0.5, 0.75]).tolist()
         assert [row["q1"], row["median"], row["q3"]] == pytest.approx(quartiles)
-        assert row["agree_percent"] == pytest.approx(100 * (found > 4).mean())
+        assert row["agree_percent"] == pytest.approx(100 * (values > 4).mean())
     assert (len(aggregates) > 0) == outputs.name.endswith("rek2024")
 
 
 def test_parquet_has_the_cells_of_the_csv_file(outputs: Path) -> None:
-    for written in (outputs / "outputs").glob("*_data.csv"):
-        cells = pd.read_csv(written, dtype=str, keep_default_na=False)
-        frame = pd.read_parquet(written.with_suffix(".parquet"))
+    for csv_file in (outputs / "outputs").glob("*_data.csv"):
+        cells = pd.read_csv(csv_file, dtype=str, keep_default_na=False)
+        frame = pd.read_parquet(csv_file.with_suffix(".parquet"))
         assert list(frame) == list(cells)
         for column in frame:
             for cell, value in zip(cells[column], frame[column], strict=True):

@@ -44,7 +44,7 @@ PEOPLE = ("P001", "P002", "P003")
 
 
 class Question(NamedTuple):
-    """A question that was asked: of a trial, or of a form, which may be asked several times."""
+    """A question about a trial, or of a form, which may be repeated."""
 
     participant: str
     trial: int | None
@@ -113,8 +113,8 @@ class Participant(Answering):
             about = {"block": trial.block, "phase": trial.phase, "condition": self._codes[trial.block].get(trial.code)}
         form, time = (page.form, page.time) if isinstance(page, QuestionnairePage) else (None, 1)
         for item, (value, first_s, last_s) in self._chosen.items():
-            asked = Question(participant=self._name, trial=page.trial, form=form, time=time, item=item)
-            self._noted.given[asked] = Given(value=value, first_s=first_s, last_s=last_s, **about)
+            question = Question(participant=self._name, trial=page.trial, form=form, time=time, item=item)
+            self._noted.given[question] = Given(value=value, first_s=first_s, last_s=last_s, **about)
         self._chosen = {}
 
 
@@ -131,7 +131,7 @@ def session_of(
     Participant(start_line.participant, answers, store.key.codes, *of_session).run()
 
 
-def held(study: Protocol, source: bytes, results: Path, felt: ConditionFeatures, number: int) -> Answers:
+def hold_sessions(study: Protocol, source: bytes, results: Path, felt: ConditionFeatures, number: int) -> Answers:
     """Hold three sessions; that of P002 is cut off at a random line and resumed."""
     answers = Answers(random.Random(number))  # noqa: S311 - of a test
     shared = {"device": DEVICE, "screens": REHEARSED_SCREENS}
@@ -153,8 +153,8 @@ def held(study: Protocol, source: bytes, results: Path, felt: ConditionFeatures,
     return answers
 
 
-def read(folder: Path, table: str) -> pd.DataFrame:
-    """Read a table of an export as its documentation says."""
+def read_exported(folder: Path, table: str) -> pd.DataFrame:
+    """Read an exported table as documented."""
     (path,) = folder.glob(f"*description-{table}_data.csv")
     return pd.read_csv(path, keep_default_na=False, na_values="n/a", dtype={"participant": str, "response": str})
 
@@ -171,15 +171,17 @@ def of_row(row: Mapping[str, Any], times: dict[tuple[str, str, str], int]) -> Qu
 
 
 def check_responses(table: pd.DataFrame, given: Mapping[Question, Given], excluded: Collection[Question] = ()) -> None:
-    """Check that each answer is in one row that counts, with its value and times, unless it is excluded or practice."""
+    """Check that each answer has one counted row with its value and times, unless it is excluded or practice."""
     times: dict[tuple[str, str, str], int] = {}
-    counted = set()
-    judged = table[(table["counted"] | table["excluded"]) & ~table["phase"].isin(["practice", "baseline"])]
-    for row in judged[judged["item"] != "adjustment"].to_dict("records"):  # its value is where the steps led to
+    counted_rows = set()
+    judged_rows = table[(table["counted"] | table["excluded"]) & ~table["phase"].isin(["practice", "baseline"])]
+    for row in judged_rows[judged_rows["item"] != "adjustment"].to_dict(
+        "records"
+    ):  # its value is where the steps led to
         question = of_row(row, times)
         answer = given[question]
-        assert question not in counted
-        counted.add(question)
+        assert question not in counted_rows
+        counted_rows.add(question)
         assert row["excluded"] == (question in excluded), question
         if isinstance(answer.value, str | tuple):
             assert row["response"] == (answer.value if isinstance(answer.value, str) else " ".join(answer.value))
@@ -190,7 +192,7 @@ def check_responses(table: pd.DataFrame, given: Mapping[Question, Given], exclud
         assert row["first_choice_s"] == pytest.approx(answer.first_s, abs=6e-4), question
         assert row["last_change_s"] == pytest.approx(answer.last_s, abs=6e-4), question
     expected = {question for question, answer in given.items() if answer.phase in (None, "main")}
-    assert counted == expected
+    assert counted_rows == expected
 
 
 def wide_cells(given: Mapping[Question, Given], columns: Collection[str]) -> Iterator[tuple[str, str, Any]]:
@@ -207,18 +209,18 @@ def wide_cells(given: Mapping[Question, Given], columns: Collection[str]) -> Ite
         if name in columns and question.time == 1:
             cells.setdefault((question.participant, name), []).append(answer.value)
     for (person, name), values in cells.items():
-        judged = [value for value in values if value is not None]
-        if not judged:
+        known_values = [value for value in values if value is not None]
+        if not known_values:
             yield person, name, None
-        elif isinstance(judged[-1], str | tuple):
-            yield person, name, judged[-1] if isinstance(judged[-1], str) else " ".join(judged[-1])
+        elif isinstance(known_values[-1], str | tuple):
+            yield person, name, known_values[-1] if isinstance(known_values[-1], str) else " ".join(known_values[-1])
         else:
-            yield person, name, median(judged)
+            yield person, name, median(known_values)
 
 
 def check_wide(folder: Path, given: Mapping[Question, Given], questions_asked_again: Collection[str]) -> int:
     """Check the cells of the wide tables (CSV, Parquet) and return how many were compared."""
-    table = read(folder, "wide").set_index("participant")
+    table = read_exported(folder, "wide").set_index("participant")
     (parquet,) = folder.glob("*-wide_data.parquet")
     typed = pd.read_parquet(parquet).set_index("participant")
     compared = 0
@@ -248,7 +250,7 @@ def test_each_answer_is_found_once_where_it_belongs(number: int, tmp_path: Path)
     text, study = drawn(number)
     file, results = tmp_path / "drawn.toml", tmp_path / "results"
     file.write_text(text, encoding="utf-8", newline="\n")
-    answers = held(study, file.read_bytes(), results, made_up(str(file)), number)
+    answers = hold_sessions(study, file.read_bytes(), results, made_up(str(file)), number)
     if number % 2:
         unblind_folder(results, by="AB", reason="a test")
     export(results, tmp_path / "all", extras=("wide", "parquet", "sav"))
@@ -269,7 +271,7 @@ def check_exported(
     folder: Path, given: Mapping[Question, Given], excluded: Collection[Question], *, unblinded: bool
 ) -> None:
     """Check the long tables of an export, and of an unblinded study the wide ones, which name conditions."""
-    table = read(folder, "responses")
+    table = read_exported(folder, "responses")
     check_responses(table, given, excluded)
     if unblinded and not excluded:
         check_wide(folder, given, {question.form for question in given if question.time > 1 and question.form})
@@ -285,22 +287,24 @@ def check_exported(
 
 
 def check_exclusion(results: Path, to: Path, answers: Answers, trials: list[int]) -> None:
-    """Exclude a trial, and include it again."""
+    """Exclude a trial and include it again; check the exports."""
     before = inattentive(results, answers)
     if any(question.participant == "P001" for question in before):
         return
     trial = answers.rng.choice(trials)
     exclude(results, "P001", 1, trial=trial, by="AB", reason="a test")
     export(results, to / "without")
-    asked = {question for question in answers.given if (question.participant, question.trial) == ("P001", trial)}
-    check_responses(read(to / "without", "responses"), answers.given, asked | before)
+    excluded_questions = {
+        question for question in answers.given if (question.participant, question.trial) == ("P001", trial)
+    }
+    check_responses(read_exported(to / "without", "responses"), answers.given, excluded_questions | before)
     include(results, "P001", 1, trial=trial, by="AB", reason="a test")
     export(results, to / "with")
-    check_responses(read(to / "with", "responses"), answers.given, before)
+    check_responses(read_exported(to / "with", "responses"), answers.given, before)
 
 
 def check_withdrawal(results: Path, to: Path, answers: Answers) -> None:
-    """Withdraw a participant: none of the texts is left, and the answers of the others are as they were."""
+    """Withdraw a participant; check that their texts are erased and that the answers of others are unchanged."""
     texts = {
         name: [
             answer.value
@@ -312,7 +316,7 @@ def check_withdrawal(results: Path, to: Path, answers: Answers) -> None:
     assert all(mentioned(results, text) for values in texts.values() for text in values)
     withdraw(results, "P003", by="AB", reason="asked for it")
     export(results, to / "two")
-    kept = {question: answer for question, answer in answers.given.items() if question.participant != "P003"}
-    check_responses(read(to / "two", "responses"), kept, inattentive(results, answers) & kept.keys())
+    remaining = {question: answer for question, answer in answers.given.items() if question.participant != "P003"}
+    check_responses(read_exported(to / "two", "responses"), remaining, inattentive(results, answers) & remaining.keys())
     for folder in (results, to / "two"):
         assert not any(mentioned(folder, text) for text in texts["P003"])

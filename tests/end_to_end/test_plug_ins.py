@@ -29,7 +29,7 @@ from study_app.store.receipt import plug_ins_of
 from tests.compiled import needs_servo
 from tests.designer.support.designer import Designer
 from tests.gui.small import ManualClock
-from tests.plug_in_packages import EXAMPLES, forget, install
+from tests.plug_in_packages import EXAMPLES, forget_plug_ins, install
 from tests.studies import rehearsed
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
@@ -63,9 +63,9 @@ def installed(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def template(installed: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Have the template installed."""
     monkeypatch.syspath_prepend(installed)
-    forget()
+    forget_plug_ins()
     yield
-    forget("liquid_study_template")
+    forget_plug_ins("liquid_study_template")
 
 
 @pytest.fixture
@@ -82,15 +82,15 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
     return command
 
 
-def test_it_is_installed_and_uninstalled(built: Path, tmp_path: Path) -> None:
+def test_a_plug_in_is_installed_and_uninstalled(built: Path, tmp_path: Path) -> None:
     venv.create(tmp_path / "venv", with_pip=False, symlinks=os.name == "posix")
     python = str(next((tmp_path / "venv").glob("[bS]*/python*")))
     around = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
     def program(*arguments: str) -> tuple[int, list[str]]:
         command = [python, "-m", "study_app", *arguments]
-        done = subprocess.run(command, env=around, capture_output=True, text=True, check=False)
-        return done.returncode, (done.stdout + done.stderr).splitlines()
+        process = subprocess.run(command, env=around, capture_output=True, text=True, check=False)
+        return process.returncode, (process.stdout + process.stderr).splitlines()
 
     none = program("plugins")
     assert none == (0, ["No plug-ins are installed; docs/plug-ins.md explains how to write one."])
@@ -143,7 +143,7 @@ class TestTemplate:
     ) -> None:
         schema = json.loads(run("check", "--schema", "protocol")[1])["$defs"]
         assert {f"{PACKAGE}:{name}" for name in ("grid", "circle", "limits")} <= {
-            one["title"] for one in schema.values()
+            property_schema["title"] for property_schema in schema.values()
         }
         monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
         designer = Designer(tmp_path)
@@ -172,8 +172,8 @@ class TestTemplate:
         items = tuple(item.view(number, form.context(study.scales, "en")) for number, item in enumerate(form.items, 1))
         window = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True)
         qtbot.addWidget(window)
-        told: list[Any] = []
-        window.event.connect(told.append)
+        actions: list[Any] = []
+        window.event.connect(actions.append)
         window.resize(1366, 768)
         window.show()
         window.show_page(
@@ -194,7 +194,7 @@ class TestTemplate:
         QTest.mouseClick(cells, Qt.MouseButton.LeftButton, pos=QPoint(int(square.left()) + 3, int(square.bottom()) - 3))
         for key in (Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Down):
             QTest.keyClick(cells, key)
-        assert [one.value for one in told if isinstance(one, Chosen)] == ["1 1", "2 1", "2 2", "2 1"]
+        assert [action.value for action in actions if isinstance(action, Chosen)] == ["1 1", "2 1", "2 2", "2 1"]
         window.may_close = True
         window.close()
 
@@ -203,8 +203,8 @@ class TestTemplate:
         self, run: Any, tmp_path: Path, installed: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         folder = tmp_path / "results"
-        code, _, said = run("rehearse", STUDY, "--participants", 2, "--device", "light-hand", "--results", folder)
-        assert (code, said) == (0, "")
+        code, _, output = run("rehearse", STUDY, "--participants", 2, "--device", "light-hand", "--results", folder)
+        assert (code, output) == (0, "")
         names = f"device light-hand, method {PACKAGE}:limits, question {PACKAGE}:grid, task {PACKAGE}:circle"
         line = f"plug-in {PACKAGE} 1.0: {names}\n"
         assert run("verify", folder)[:2] == (0, f"{line}2 sessions: sound\n")
@@ -218,16 +218,16 @@ class TestTemplate:
         assert used == [*names.split(", "), f"finding {PACKAGE}:ends_of_scale"]
         exported = {path.name: path.read_bytes() for path in page.parent.glob("*trials*.csv")}
         monkeypatch.setattr(sys, "path", [path for path in sys.path if path != str(installed)])
-        forget("liquid_study_template")
-        code, said, _ = run("verify", folder)
-        assert (code, said.count("warning")) == (0, 1)
-        assert f"of {PACKAGE} 1.0, which is not installed" in said
+        forget_plug_ins("liquid_study_template")
+        code, output, _ = run("verify", folder)
+        assert (code, output.count("warning")) == (0, 1)
+        assert f"of {PACKAGE} 1.0, which is not installed" in output
         assert run("report", folder, "--to", tmp_path / "later")[::2] == (0, "")
         assert {path.name: path.read_bytes() for path in (tmp_path / "later").glob("*trials*.csv")} == exported
         assert run("export", folder, "--to", tmp_path / "tables")[0] == 0
-        code, _, said = run("reproduce", folder / "data" / "sub-P001" / "ses-01")
-        assert (code, said.count("\n")) == (2, 1)
-        assert f"the plug-in {PACKAGE}, which is not installed: pip install {PACKAGE}" in said
+        code, _, output = run("reproduce", folder / "data" / "sub-P001" / "ses-01")
+        assert (code, output.count("\n")) == (2, 1)
+        assert f"the plug-in {PACKAGE}, which is not installed: pip install {PACKAGE}" in output
 
     def test_its_outlet_is_fed(self) -> None:
         class Servo:
@@ -285,7 +285,7 @@ TOY_STUDY = (
 
 
 @needs_servo
-def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
+def test_a_fault_of_a_plug_in_is_one_line_and_loses_no_data(
     run: Any, site: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     study, folder = tmp_path / "toy.toml", tmp_path / "results"
@@ -293,24 +293,26 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
     points = {"toy": "toy_plug:Toy"}
     install(site, "toy_typo", "outlet", {"toy": "toy-typo:Toy"})
     install(site, "toy-plug", "question", points, toy_plug=QUESTION.format(problem="1 / 0", measure="1 / 0"))
-    code, _, said = run("rehearse", study, "--participants", 1, "--results", folder)
+    code, _, output = run("rehearse", study, "--participants", 1, "--results", folder)
     line = "the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero): update or uninstall the plug-in"
-    assert (code, said.splitlines()[-1], "Traceback" in said) == (2, f"liquid-study: {line}", False)
+    assert (code, output.splitlines()[-1], "Traceback" in output) == (2, f"liquid-study: {line}", False)
     (logged,) = caplog.records  # with its trace, which no terminal shows
     assert (logged.getMessage(), bool(logged.exc_info)) == (line, True)
     caplog.clear()
-    code, said, _ = run("verify", folder)
-    assert (code, said.splitlines()[-1]) == (0, "1 session: sound")
+    code, output, _ = run("verify", folder)
+    assert (code, output.splitlines()[-1]) == (0, "1 session: sound")
     assert len((folder / "data/sub-P001/ses-01").glob("*responses*").__next__().read_text("utf-8").splitlines()) == 3
     (site / "toy_plug.py").write_text(
         (site / "toy_plug.py").read_text("utf-8").replace("1 / 0", "return None", 1), encoding="utf-8", newline="\n"
     )
-    forget("toy_")
+    forget_plug_ins("toy_")
     other = tmp_path / "others"
     assert run("rehearse", study, "--participants", 1, "--results", other)[0] == 0
     assert run("unblind", other, "--by", "AK", "--reason", "test")[0] == 0
-    code, _, said = run("report", other, "--to", tmp_path / "report")
-    assert said.count("the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero)") == said.count("\n") == 1
+    code, _, output = run("report", other, "--to", tmp_path / "report")
+    assert (
+        output.count("the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero)") == output.count("\n") == 1
+    )
     assert "Smooth" in (tmp_path / "report" / "report.html").read_text("utf-8")
 
 
@@ -329,21 +331,21 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
         (QUESTION.replace("def problem", "x: slice\n\n        def problem"), "PydanticSchemaGenerationError"),
     ],
 )
-def test_what_cannot_be_used_is_a_line_and_hides_no_other(
+def test_an_unusable_plug_in_is_one_line_and_does_not_hide_others(
     run: Any, site: Path, tmp_path: Path, source: str, reason: str
 ) -> None:
     whole = source.format(problem="return None", measure="return {}") if "MEASURE" in source else source
     install(site, "toy-plug", "question", {"toy": "toy_plug:Toy"}, toy_plug=whole)
-    code, said, _ = run("plugins")
-    (_, line) = said.splitlines()
+    code, output, _ = run("plugins")
+    (_, line) = output.splitlines()
     assert code == 3
     assert line.startswith(f"    question  toy: {reason}")
     assert line.endswith("; update or uninstall the plug-in")
     study = tmp_path / "toy.toml"
     study.write_text(TOY_STUDY, encoding="utf-8", newline="\n")
-    code, _, said = run("check", study)
+    code, _, output = run("check", study)
     assert code == 2
-    assert f'"toy-plug:toy" is a question that the plug-in toy-plug 1.0 does not provide: {reason}' in said
+    assert f'"toy-plug:toy" is a question that the plug-in toy-plug 1.0 does not provide: {reason}' in output
     assert run("check", "demo")[0] == 0
 
 
@@ -359,16 +361,18 @@ def test_a_finding_whose_place_is_not_a_number_is_reported_and_left_out(
             {name} = {value}
     """
     install(site, "toy-plug", "finding", {"toy": "toy_plug:Toy"}, toy_plug=source)
-    code, said, _ = run("plugins")
-    assert (code, f"toy: Toy has the {name} {value}: specify a number; update" in said) == (3, True)
-    assert "toy" not in {one.key for one in all_findings()}
+    code, output, _ = run("plugins")
+    assert (code, f"toy: Toy has the {name} {value}: specify a number; update" in output) == (3, True)
+    assert "toy" not in {finding.key for finding in all_findings()}
 
 
 @pytest.mark.parametrize(
     ("kind", "base", "lacks"),
     [("method", "trials.methods:Method", "level, levels_of, presentations"), ("task", "trials.tasks:Task", "limit_s")],
 )
-def test_a_class_that_lacks_what_it_must_have_is_named(run: Any, site: Path, kind: str, base: str, lacks: str) -> None:
+def test_a_plug_in_class_without_a_required_member_is_named(
+    run: Any, site: Path, kind: str, base: str, lacks: str
+) -> None:
     module, _, name = base.partition(":")
     source = f"""
         from typing import Literal
@@ -378,8 +382,8 @@ def test_a_class_that_lacks_what_it_must_have_is_named(run: Any, site: Path, kin
             kind: Literal["toy-plug:toy"] = "toy-plug:toy"
     """
     install(site, "toy-plug", kind, {"toy": "toy_plug:Toy"}, toy_plug=source)
-    code, said, _ = run("plugins")
-    assert (code, f"toy: toy_plug:Toy lacks {lacks}: define them; update" in said) == (3, True)
+    code, output, _ = run("plugins")
+    assert (code, f"toy: toy_plug:Toy lacks {lacks}: define them; update" in output) == (3, True)
 
 
 IN_STUDY = {
@@ -458,16 +462,14 @@ def test_an_answer_of_a_plug_in_that_is_too_long_is_refused(run: Any, study_with
 DEVICE = (TEMPLATE / "src/liquid_study_template/device.py").read_text("utf-8")
 
 
-def test_a_device_that_ends_the_program_hides_no_other_and_one_that_opens_nothing_is_named(
-    run: Any, site: Path
-) -> None:
+def test_a_plug_in_device_that_exits_or_fails_to_open_is_named(run: Any, site: Path) -> None:
     probes = DEVICE.replace("probe=lambda: [", "probe=lambda: exit(3) or [")
     install(site, "toy-plug", "device", {"toy": "toy_plug:LIGHT_HAND"}, toy_plug=probes)
-    code, said, _ = run("devices")
+    code, output, _ = run("devices")
     assert code == 0
-    assert "the plug-in toy-plug 1.0 failed (SystemExit: 3)" in said
-    assert "falcon" in said
-    forget("toy_")
+    assert "the plug-in toy-plug 1.0 failed (SystemExit: 3)" in output
+    assert "falcon" in output
+    forget_plug_ins("toy_")
     (site / "toy_plug.py").write_text(
         DEVICE.replace("return opened(LightHand())", "return None"), encoding="utf-8", newline="\n"
     )
@@ -477,11 +479,11 @@ def test_a_device_that_ends_the_program_hides_no_other_and_one_that_opens_nothin
 
 def test_a_plug_in_that_is_interrupted_at_its_import_is_a_line(run: Any, site: Path) -> None:
     install(site, "toy-plug", "device", {"toy": "toy_plug:X"}, toy_plug="raise KeyboardInterrupt")
-    code, said, _ = run("plugins")
-    assert (code, "device    toy: KeyboardInterrupt; update or uninstall the plug-in" in said) == (3, True)
+    code, output, _ = run("plugins")
+    assert (code, "device    toy: KeyboardInterrupt; update or uninstall the plug-in" in output) == (3, True)
 
 
-def test_a_finding_that_returns_nothing_takes_no_other_test_away(run: Any, site: Path, tmp_path: Path) -> None:
+def test_a_finding_that_returns_none_does_not_affect_other_tests(run: Any, site: Path, tmp_path: Path) -> None:
     source = """
         from study_app.analysis.findings.finding import Finding
 
@@ -495,8 +497,8 @@ def test_a_finding_that_returns_nothing_takes_no_other_test_away(run: Any, site:
     install(site, "toy-plug", "finding", {"toy": "toy_plug:Toy"}, toy_plug=source)
     study = rehearsed(tmp_path)
     assert run("unblind", study, "--by", "AK", "--reason", "test")[0] == 0
-    code, _, said = run("report", study, "--to", tmp_path / "report")
-    lines = said.splitlines()
+    code, _, output = run("report", study, "--to", tmp_path / "report")
+    lines = output.splitlines()
     assert code == 3
     assert all(
         "the plug-in toy-plug 1.0 failed (test of finding toy returned None, not a value and" in line for line in lines

@@ -47,8 +47,8 @@ def test_a_session_by_keys_and_clicks_from_the_home_window_into_the_csv(display,
     program = Program(display, tmp_path)
     try:
         begin_session(program, qtbot)
-        felt = explore_to_the_questionnaire(program)
-        answer_nine_items(program, felt, qtbot)
+        study_window = explore_to_the_questionnaire(program)
+        answer_nine_items(program, study_window, qtbot)
         program.wait_for_event("responses")
         wait_for(lambda: responses(tmp_path), "rows in the table of responses")  # written after the journal
         rows = responses(tmp_path)
@@ -90,12 +90,12 @@ def begin_session(program: Program, qtbot) -> None:
 
 def explore_to_the_questionnaire(program: Program) -> str:
     """Agree, read on, practise, and explore the first liquid with the mouse; return the participant's window."""
-    felt = program.window("^Study$")
-    program.key(felt, "Return")
+    study_window = program.window("^Study$")
+    program.key(study_window, "Return")
     for trial in (1, 2):
         while len(program.events("trial_started")) < trial:
             pages = len(program.events("page_shown"))
-            program.key(felt, "space")
+            program.key(study_window, "space")
             wait_for(
                 lambda pages=pages: len(program.events("page_shown")) > pages or program.events("trial_started"),
                 "the next page",
@@ -103,9 +103,9 @@ def explore_to_the_questionnaire(program: Program) -> str:
         while len(program.events("trial_ended")) < trial:
             program.xdotool("mousemove_relative", "--", "40", "-15")
             program.xdotool("mousemove_relative", "--", "-40", "15")
-            program.key(felt, "space")
+            program.key(study_window, "space")
     program.wait_for_event("item_shown", 9)
-    return felt
+    return study_window
 
 
 def answer_nine_items(program: Program, felt: str, qtbot) -> None:
@@ -135,5 +135,5 @@ def answer_nine_items(program: Program, felt: str, qtbot) -> None:
 
 def responses(folder: Path) -> list[dict[str, str]]:
     (table,) = folder.glob("results/rek2024/data/sub-P042/ses-01/*_description-responses_data.csv")
-    with table.open(encoding="utf-8", newline="") as opened:
-        return list(csv.DictReader(opened))
+    with table.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))

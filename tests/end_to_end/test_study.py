@@ -33,7 +33,7 @@ FIXED = [name for name in shipped() if not load(name).stimuli]
 
 
 def besides(*names: str) -> list[Any]:
-    """Return the shipped protocols of fixed conditions; those other than ``names`` are of the nightly circle."""
+    """Return the shipped protocols of fixed conditions; those not in ``names`` are nightly."""
     return [name if name in names else pytest.param(name, marks=pytest.mark.nightly) for name in FIXED]
 
 
@@ -69,22 +69,22 @@ def test_sessions_are_complete_and_every_response_is_there_once(rehearsed: tuple
         assert (receipt["device"]["name"], receipt["participant"]) == ("scripted", session.participant)
 
 
-def test_a_rehearsed_study_is_sound_and_every_force_of_it_comes_out_again(rehearsed: tuple[str, StudyFolder]) -> None:
+def test_a_rehearsed_study_is_sound_and_its_forces_are_replayed(rehearsed: tuple[str, StudyFolder]) -> None:
     _, folder = rehearsed
     assert verify_study(folder.path).is_sound
     assert verify_study(folder.path).warnings == ()
     for session in folder.sessions():
-        found = replay(session.path)
-        assert (found.differences, found.uncompared) == ((), ())
-        assert found.recordings == len(journal_events(session, "trial_started"))
+        replay_result = replay(session.path)
+        assert (replay_result.differences, replay_result.uncompared) == ((), ())
+        assert replay_result.recordings == len(journal_events(session, "trial_started"))
 
 
 def journal_events(session: SessionFolder, name: str) -> list[dict[str, Any]]:
     return [line for line in raw(journal.read(session.journal)) if line["event"] == name]
 
 
-def test_answers_follow_what_was_seen(rehearsal_of: Callable[[str], Path]) -> None:
-    """The longest delay seems more different from the baseline than none does, to every simulated participant."""
+def test_answers_follow_the_simulated_delay(rehearsal_of: Callable[[str], Path]) -> None:
+    """Every simulated participant rates the longest delay as more different from the baseline than no delay."""
     folder = StudyFolder(rehearsal_of("rek2024"))
     codes = open_or_draw_key(folder.path, load("rek2024"), stream(1, "blinding").random).codes["delays"]
     of = {condition: code for code, condition in codes.items()}

@@ -29,21 +29,21 @@ pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.xvfb, pytest.mark.timeo
 def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Visitor]:
     monkeypatch.chdir(tmp_path)
     with virtual_display("-fbdir", str(tmp_path)) as display:
-        begun = Visitor(display, tmp_path)
-        yield begun
-        begun.close()
+        visitor = Visitor(display, tmp_path)
+        yield visitor
+        visitor.close()
 
 
 @pytest.fixture
-def plan(program: Visitor, qtbot: Any) -> MainController:
-    """The same visit off screen, to look up where its parts lie."""
+def off_screen_copy(program: Visitor, qtbot: Any) -> MainController:
+    """An off-screen copy of the program, from which tests look up the positions of widgets."""
     home_window(program)
-    made = MainController()
-    qtbot.addWidget(made.window)
-    laid_out(made.window, (HOME.width(), HOME.height()))
-    qtbot.waitUntil(lambda: bool(new_session(made)))
-    laid_out(made.window, (HOME.width(), HOME.height()))
-    return made
+    controller = MainController()
+    qtbot.addWidget(controller.window)
+    laid_out(controller.window, (HOME.width(), HOME.height()))
+    qtbot.waitUntil(lambda: bool(new_session(controller)))
+    laid_out(controller.window, (HOME.width(), HOME.height()))
+    return controller
 
 
 def home_window(program: Visitor) -> str:
@@ -54,16 +54,18 @@ def preflight_window(program: Visitor) -> str:
     return program.window_of("^Liquid Study$", PREFLIGHT)
 
 
-def new_session(plan: MainController) -> list[ActionButton]:
+def new_session(off_screen_copy: MainController) -> list[ActionButton]:
     """Return the button of the thesis' study; none before its card is shown."""
-    buttons = plan.window.findChildren(ActionButton)
-    return [one for one in buttons if one.accessibleName().startswith("New session of Feeling simulated liquids")]
+    buttons = off_screen_copy.window.findChildren(ActionButton)
+    return [
+        button for button in buttons if button.accessibleName().startswith("New session of Feeling simulated liquids")
+    ]
 
 
-def dialog_of(plan: MainController) -> NewSessionDialog:
-    place = plan.window.place("home")
+def dialog_of(off_screen_copy: MainController) -> NewSessionDialog:
+    place = off_screen_copy.window.place("home")
     assert isinstance(place, HomePlace)
-    new_session(plan)[0].click()
+    new_session(off_screen_copy)[0].click()
     dialog = place.dialog
     assert isinstance(dialog, NewSessionDialog)
     laid_out(dialog, (dialog.width(), dialog.height()))
@@ -72,21 +74,21 @@ def dialog_of(plan: MainController) -> NewSessionDialog:
 
 def operator_plan(pages: Pages, size: tuple[int, int], qtbot: Any) -> OperatorWindow:
     """Return the operator's window at the end of the session."""
-    made = OperatorWindow("rek2024", lateness_limit_s=0.002, reach_m=0.05, pointer=True)
-    qtbot.addWidget(made)
-    made.header.page.show()  # as where both windows share a screen
-    made.show_view(pages.ended_view())
-    laid_out(made, size)
-    return made
+    window = OperatorWindow("rek2024", lateness_limit_s=0.002, reach_m=0.05, pointer=True)
+    qtbot.addWidget(window)
+    window.header.page.show()  # as where both windows share a screen
+    window.show_view(pages.ended_view())
+    laid_out(window, size)
+    return window
 
 
-def changed(program: Visitor, before: Any) -> bool:
-    """Return whether much of what the display shows is no longer what it was."""
+def has_changed(program: Visitor, before: Any) -> bool:
+    """Return whether much of the display has changed."""
     return bool(np.mean(np.any(program.picture() != before, axis=2)) > 0.05)
 
 
 def check(program: Visitor, given: dict[tuple[int, str], int], *, simulated: str) -> None:
-    """Check what is on the disk after a session."""
+    """Check the files of a finished session."""
     rows = program.table("responses")
     assert {(int(row["trial"]), row["item"]): int(row["response"]) for row in rows} == given
     assert len(rows) == len(given) == ANSWERS
@@ -98,12 +100,12 @@ def check(program: Visitor, given: dict[tuple[int, str], int], *, simulated: str
     assert [event["status"] for event in program.events("session_ended")] == ["completed"]
     for kind in ("paused", "broke", "force_stopped", "repeat"):
         assert not program.events(kind)
-    found = program.verified()
-    assert found.returncode == 0, found.stdout + found.stderr
+    verification = program.verified()
+    assert verification.returncode == 0, verification.stdout + verification.stderr
 
 
 def check_left(program: Visitor) -> None:
-    """Check how the program ended: as it should, with no window and no word on its errors."""
+    """Check that the program ended normally, without a window or an error message."""
     assert program.process.wait(30) == 0
     assert not program.windows(".")
     assert program.process.stderr is not None
@@ -112,14 +114,16 @@ def check_left(program: Visitor) -> None:
 
 
 @pytest.mark.nightly
-def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan: MainController, qtbot: Any) -> None:
+def test_a_whole_study_by_keyboard_from_home_to_home(
+    program: Visitor, off_screen_copy: MainController, qtbot: Any
+) -> None:
     person = Person(program)
     pointer = program.xdotool("getmouselocation").split(" window:")[0]  # windows come and go under it
-    home, main = home_window(program), plan.window
+    home, main = home_window(program), off_screen_copy.window
     person.take_keyboard(home)
-    person.press(*["Tab"] * tabs_to(main, new_session(plan)[0]), "Return")
+    person.press(*["Tab"] * tabs_to(main, new_session(off_screen_copy)[0]), "Return")
     person.take_keyboard(program.window("^New session$"))
-    dialog = dialog_of(plan)
+    dialog = dialog_of(off_screen_copy)
     device = dialog.editors["device"].control
     to_device = tabs_to(dialog, device)
     down = device.findData("scripted") - device.currentIndex()
@@ -130,30 +134,30 @@ def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan:
     person.take_keyboard(program.window("^Study$"))
     program.wait_for_event("session_started")
     pages = Pages(program.events("session_started")[0])
-    given = person.walk(pages)
+    answers = person.walk(pages)
     person.take_keyboard(program.window("operator$"))
     cockpit = operator_plan(pages, program.size(person.window), qtbot)
     person.press(*["Tab"] * tabs_to(cockpit, cockpit.buttons.close_session), "Return")
     person.take_keyboard(home_window(program))
     assert program.windows(".") == [person.window]
-    check(program, given, simulated="true")
-    see_results_and_dark_theme_by_keys(program, person, plan)
+    check(program, answers, simulated="true")
+    see_results_and_dark_theme_by_keys(program, person, off_screen_copy)
     assert program.xdotool("getmouselocation").split(" window:")[0] == pointer
     assert not program.orders & {"click", "mousedown", "mousemove", "mousemove_relative"}
     person.press("ctrl+q")
     check_left(program)
 
 
-def see_results_and_dark_theme_by_keys(program: Visitor, person: Person, plan: MainController) -> None:
-    main, rail = plan.window, plan.window.rail
+def see_results_and_dark_theme_by_keys(program: Visitor, person: Person, off_screen_copy: MainController) -> None:
+    main, rail = off_screen_copy.window, off_screen_copy.window.rail
     laid_out(main, (HOME.width(), HOME.height()))
     home = program.picture()
     person.walk_to(main, rail.buttons["results"], "shift+Tab")
     person.press("Return")
-    wait_for(lambda: changed(program, home), "results")
+    wait_for(lambda: has_changed(program, home), "results")
     person.walk_to(main, rail.buttons["home"], "shift+Tab")
     person.press("space")
-    wait_for(lambda: not changed(program, home), "home")
+    wait_for(lambda: not has_changed(program, home), "home")
     person.walk_to(main, rail.switch, "Tab")
     person.press("Return")
     wait_for(lambda: float(program.picture()[..., :3].mean()) < DARK_MEAN, "the dark theme")

@@ -41,8 +41,8 @@ def visit_all(visit):
         if not view.left_out:
             return
         print(view.trouble)
-        print(*sorted(one.participant for one in view.sessions))
-        print("excluded:", *(one.participant for one in view.left_out))
+        print(*sorted(session.participant for session in view.sessions))
+        print("excluded:", *(session.participant for session in view.left_out))
         visit.window.close()
     visit.asked = False
     for place in ("designer", "lab", "devices", "machine", "home", "results"):
@@ -68,9 +68,9 @@ def environment(tmp_path: Path) -> dict[str, str]:
 
 def run(environment: dict[str, str], *words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "study_app", *words]
-    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == code, done.stderr
-    return done
+    process = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert process.returncode == code, process.stderr
+    return process
 
 
 @pytest.mark.nightly
@@ -95,16 +95,18 @@ def test_a_study_is_rehearsed_verified_and_replayed_without_them(environment: di
 @pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
-def test_every_place_opens_without_them_and_results_says_what_to_install(
+def test_every_page_opens_without_the_analysis_libraries_and_results_names_the_extra(
     environment: dict[str, str], tmp_path: Path
 ) -> None:
     shutil.copytree(ROOT / "tests" / "store" / "releases" / "0.1" / "rek2024", tmp_path / "results" / "rek2024")
     command = [sys.executable, "-c", PLACES, str(tmp_path / "results")]
-    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False, timeout=150)
-    assert done.returncode == 0, done.stderr
-    assert "title='Your data are complete', sentence=\"Figures need pandas, which is not installed" in done.stdout
-    assert "pip install 'liquid-study[analysis]'" in done.stdout
-    assert "P001 P002\nexcluded: P001" in done.stdout
+    process = subprocess.run(
+        command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False, timeout=150
+    )
+    assert process.returncode == 0, process.stderr
+    assert "title='Your data are complete', sentence=\"Figures need pandas, which is not installed" in process.stdout
+    assert "pip install 'liquid-study[analysis]'" in process.stdout
+    assert "P001 P002\nexcluded: P001" in process.stdout
 
 
 def test_another_missing_module_stays_the_bug_that_it_is() -> None:
@@ -114,7 +116,7 @@ def test_another_missing_module_stays_the_bug_that_it_is() -> None:
         raise ModuleNotFoundError("No module named 'scipy.stats'", name="scipy.stats")
 
 
-def test_the_extra_is_what_is_blocked_here_and_no_dependency() -> None:
+def test_the_blocked_libraries_are_the_analysis_extra_and_not_dependencies() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
     extra = {Requirement(line).name.lower() for line in project["optional-dependencies"]["analysis"]}

@@ -58,32 +58,32 @@ def test_a_chosen_workspace_counts_from_every_start_folder(documents, tmp_path, 
 def test_windows_show_the_same_sessions_and_suggest_the_same_id_from_two_start_folders(
     documents, tmp_path, monkeypatch, qtbot
 ):
-    kept = Workspace(tmp_path / "kept")
-    keep_workspace(kept)
-    shown, ids = [], []
+    kept_workspace = Workspace(tmp_path / "kept")
+    keep_workspace(kept_workspace)
+    shown_sessions, ids = [], []
     for name in ("first", "second"):
         start_folder(tmp_path / name, monkeypatch)
         if name == "first":
             for participant in ("P001", "P002"):
-                begin_session(kept.results / "demo", participant)
+                begin_session(kept_workspace.results / "demo", participant)
         visit = MainController()
         qtbot.addWidget(visit.window)
         home = visit.window.place("home")
         home.show_sessions()
         qtbot.waitUntil(lambda home=home: not home.is_reading)
-        shown.append([facts.participant for facts in home.sessions.shown])
+        shown_sessions.append([facts.participant for facts in home.sessions.shown])
         home.ask_for_session(study_facts("demo"))
         ids.append(tuple(home.dialog.editors[name].value for name in ("participant", "results")))
         assert home.dialog.editors["results"].aside.text() == "in the workspace"
         home.dialog.editors["results"].show_value(str(tmp_path / "other"))
         assert home.dialog.editors["results"].aside.text().startswith("outside the workspace")
         home.dialog.reject()
-        assert home.folder.accessibleName() == f"Workspace: {kept.folder}"
+        assert home.folder.accessibleName() == f"Workspace: {kept_workspace.folder}"
         visit.end()
         assert not Path("results").exists()
-    assert shown[0] == shown[1]
-    assert sorted(shown[0]) == ["P001", "P002"]
-    assert ids[0] == ids[1] == ("P003", str(kept.results / "demo"))
+    assert shown_sessions[0] == shown_sessions[1]
+    assert sorted(shown_sessions[0]) == ["P001", "P002"]
+    assert ids[0] == ids[1] == ("P003", str(kept_workspace.results / "demo"))
 
 
 def begin_session(folder: Path, participant: str) -> None:
@@ -91,7 +91,7 @@ def begin_session(folder: Path, participant: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documents, tmp_path, monkeypatch, qtbot):
+def test_the_first_start_asks_once_before_creating_the_workspace(documents, tmp_path, monkeypatch, qtbot):
     start_folder(tmp_path / "start", monkeypatch)
     visit = MainController()
     qtbot.addWidget(visit.window)
@@ -116,7 +116,7 @@ def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documen
 
 
 @pytest.mark.slow
-def test_a_file_is_refused_as_the_workspace_and_stays_no_setting(documents, tmp_path, monkeypatch, qtbot):
+def test_a_file_is_refused_as_the_workspace_and_not_saved(documents, tmp_path, monkeypatch, qtbot):
     start_folder(tmp_path / "start", monkeypatch)
     (tmp_path / "file").write_text("", encoding="utf-8", newline="\n")
     visit, messages = MainController(), []
@@ -176,13 +176,13 @@ def test_home_shows_no_card_for_a_liquid_file(tmp_path, monkeypatch):
     assert "broken" in known_sources()
 
 
-def test_the_first_command_that_writes_keeps_the_offered_workspace_and_says_so_once(documents, tmp_path, monkeypatch):
+def test_the_first_writing_command_saves_the_default_workspace_and_prints_it_once(documents, tmp_path, monkeypatch):
     start_folder(tmp_path / "start", monkeypatch)
-    made = CliRunner().invoke(commands, ["new", "thick", "--no-window"])
-    assert f"this machine's workspace: {documents / 'Liquid Study'} (" in made.stderr
+    result = CliRunner().invoke(commands, ["new", "thick", "--no-window"])
+    assert f"this machine's workspace: {documents / 'Liquid Study'} (" in result.stderr
     start_folder(tmp_path / "clone", monkeypatch, "results", "protocols")
-    made = CliRunner().invoke(commands, ["new", "thin", "--no-window"])
-    assert made.stderr == ""
+    result = CliRunner().invoke(commands, ["new", "thin", "--no-window"])
+    assert result.stderr == ""
     assert workspace().folder == documents / "Liquid Study"
 
 
@@ -191,9 +191,9 @@ def test_a_protocol_file_of_a_command_is_among_the_recent_ones_and_its_results_i
 ):
     start_folder(tmp_path / "start", monkeypatch)
     keep_workspace(Workspace(tmp_path / "kept"))
-    held = []
-    monkeypatch.setattr(LiveSession, "open", lambda session: (held.append(session.chosen), session.over.emit()))
+    sources = []
+    monkeypatch.setattr(LiveSession, "open", lambda session: (sources.append(session.chosen), session.over.emit()))
     Path("mine.toml").write_bytes(source_bytes("demo"))
     assert app.run("mine.toml", participant="P001") == 0
-    assert held[0].results == tmp_path / "kept" / "results" / "demo"
+    assert sources[0].results == tmp_path / "kept" / "results" / "demo"
     assert recent_protocols() == (str(tmp_path / "start" / "mine.toml"),)

@@ -60,11 +60,11 @@ LEAVING_S, LEAVES = 0.8, 20  # a tank is left again, if it was not, after so lon
 
 
 def _shorter() -> str:
-    """Return the thesis' study with tasks of a second; all else is as it was."""
+    """Return the thesis' study with tasks of one second."""
     text = source_bytes("rek2024").decode()
     for long, short in SHORTER.items():
-        text, found = re.subn(f"^{long}", short, text, flags=re.MULTILINE)
-        assert found, long
+        text, replacements = re.subn(f"^{long}", short, text, flags=re.MULTILINE)
+        assert replacements, long
     return text
 
 
@@ -82,12 +82,12 @@ class Visitor(Program):
         super().__init__(display, folder)
 
     def xdotool(self, *arguments: str) -> str:
-        """Give orders, and remember them: keys and the mouse are told apart by them."""
+        """Run xdotool with these arguments and record them."""
         self.orders |= set(arguments)
         return super().xdotool(*arguments)
 
     def picture(self) -> NDArray[np.uint8]:
-        """Return what the display shows: rows, columns and the four bytes of a pixel."""
+        """Return the picture on the display: rows, columns and the four bytes of a pixel."""
         raw = (self.folder / "Xvfb_screen0").read_bytes()
         head = np.frombuffer(raw, ">u4", 25)
         width, height, colours = int(head[4]), int(head[5]), int(head[19])
@@ -96,11 +96,11 @@ class Visitor(Program):
 
     def table(self, name: str) -> list[dict[str, str]]:
         (path,) = self.folder.glob(f"results/*/data/sub-*/ses-01/*_description-{name}_data.csv")
-        with path.open(encoding="utf-8", newline="") as opened:
-            return list(csv.DictReader(opened))
+        with path.open(encoding="utf-8", newline="") as file:
+            return list(csv.DictReader(file))
 
     def verified(self) -> subprocess.CompletedProcess[str]:
-        """Return what the program finds in the results that it wrote."""
+        """Return the verification of the results that the program wrote."""
         (study,) = self.folder.glob("results/*")
         words = [sys.executable, "-m", "study_app", "verify", str(study)]
         return subprocess.run(words, capture_output=True, text=True, check=False)
@@ -113,8 +113,8 @@ class Pages:
         protocol = parse(SHORT.encode(), "rek2024")
         self.schedule = build_schedule(protocol, started["participant"], started["seed"])
         key = draw_key(protocol, stream(1, "key").random)  # codes are all that pages show
-        shown = without_force(protocol) if started["device"] == "mouse" else protocol
-        self._state = initial_state(shown, self.schedule, key, started["language"])
+        shown_protocol = without_force(protocol) if started["device"] == "mouse" else protocol
+        self._state = initial_state(shown_protocol, self.schedule, key, started["language"])
         self.protocol: Protocol = protocol
         self.page: Page | None = None
         self.take(Begin(0.0))
@@ -129,15 +129,15 @@ class Pages:
 
     def answer(self, page: QuestionnairePage) -> dict[tuple[int, str], int]:
         """Answer the page here as well; return the values by trial and statement."""
-        given = {(page.trial, item.id): (3 * page.trial + 2 * item.number) % 7 + 1 for item in page.items}
-        for (_, item), value in given.items():
+        answers = {(page.trial, item.id): (3 * page.trial + 2 * item.number) % 7 + 1 for item in page.items}
+        for (_, item), value in answers.items():
             self.take(ItemShown(0.0, item))
             self.take(Chosen(0.0, item, value))
         self.take(Submitted(0.0))
-        return given
+        return answers
 
     def ended_view(self) -> OperatorView:
-        """Return what the operator sees in the end."""
+        """Return the operator's last view."""
         ended = Progress()
         ended.process_line(event_of("session_started", t_s=0.0))
         ended.process_line(event_of("session_ended", t_s=1.0, status="completed"))
@@ -157,14 +157,14 @@ class Pages:
 
 
 class Person:
-    """Goes through the study by keys; the pointer stays where it was when the display began."""
+    """A person who uses the program by keys only; the pointer keeps its initial position."""
 
     def __init__(self, program: Visitor) -> None:
         self.program = program
         self.window = ""
 
     def take_keyboard(self, window: str) -> None:
-        """Do what a window manager does with a window that opens; from then on keys go where the keyboard is."""
+        """Give a newly opened window the keyboard focus, like a window manager."""
         self.window = window
         self.program.xdotool("windowfocus", "--sync", window)
 
@@ -173,7 +173,7 @@ class Person:
         self.program.xdotool("key", *keys)
 
     def walk_to(self, window: QWidget, part: QWidget, key: str) -> None:
-        """Press a key until the ring of the keyboard is seen at a part, which lies where it does in a window here."""
+        """Press a key until the focus ring surrounds a part, found by its position in an off-screen window."""
         shell = self.program.xdotool("getwindowgeometry", "--shell", self.window).splitlines()
         left, top = (int(line.partition("=")[2]) for line in shell if line.startswith(("X=", "Y=")))
         at = part.mapTo(window, QPoint(part.width() // 2, 1))
@@ -198,7 +198,7 @@ class Person:
         """Look on: the scripted hand reaches."""
 
     def fill_in(self, page: QuestionnairePage, values: list[int]) -> None:
-        """Answer by digit, by arrows and space from either side, and one after going back to it."""
+        """Answer by digits, by arrows and space from either side, and once after going back."""
         keys: list[str] = []
         for item, value in zip(page.items, values, strict=True):
             if item.number in CORRECTED:
@@ -213,9 +213,9 @@ class Person:
         self.press(*keys, "Return")
 
     def walk(self, pages: Pages) -> dict[tuple[int, str], int]:
-        """Go from the first page to the last; return what was answered."""
-        given: dict[tuple[int, str], int] = {}
-        read = done = filled = 0
+        """Walk from the first page to the last; return the answers."""
+        all_answers: dict[tuple[int, str], int] = {}
+        read = pages_done = filled = 0
         while not pages.over:
             page = pages.page
             if isinstance(page, TextPage):
@@ -225,26 +225,26 @@ class Person:
                 self.program.wait_for_event("page_left", read)
                 pages.take(Continue(1e3))
             elif isinstance(page, TaskPage):
-                done += 1
-                self.program.wait_for_event("trial_started", done)
-                self._do(page, partial(self._have_ended, done))
+                pages_done += 1
+                self.program.wait_for_event("trial_started", pages_done)
+                self._do(page, partial(self._have_ended, pages_done))
                 pages.take(TaskDone(0.0, "complete", {}))
             else:
                 assert isinstance(page, QuestionnairePage)
-                self.program.wait_for_event("item_shown", len(given) + len(page.items))
+                self.program.wait_for_event("item_shown", len(all_answers) + len(page.items))
                 answers = pages.answer(page)
                 self.fill_in(page, list(answers.values()))
-                given |= answers
+                all_answers |= answers
                 filled += 1
                 self.program.wait_for_event("responses", filled)
         self.program.wait_for_event("session_ended")
-        return given
+        return all_answers
 
     def _in_another_language_and_back(self, page: TextPage, pages: Pages) -> TextPage:
-        """Where languages can be chosen, look at the page in another one; return the page."""
-        for chosen, language in enumerate((*page.languages[1:], *page.languages[:1]), start=1):
+        """If languages can be chosen, show the page in another language; return the page."""
+        for language_number, language in enumerate((*page.languages[1:], *page.languages[:1]), start=1):
             self.choose_language(page, language)
-            self.program.wait_for_event("language_chosen", chosen)
+            self.program.wait_for_event("language_chosen", language_number)
             pages.take(LanguageChosen(0.0, language))
             assert isinstance(pages.page, TextPage)
             page = pages.page
@@ -254,7 +254,7 @@ class Person:
         return len(self.program.events("trial_ended")) >= trials
 
     def _do(self, page: TaskPage, ended: Callable[[], bool]) -> None:
-        """Do a task: an exploration is left, again where that came before its least time."""
+        """Do a task; leave an exploration, repeatedly if its minimum time has not elapsed."""
         if not isinstance(page.task, Explore):
             self.reach(page, ended)
         for _ in range(LEAVES if isinstance(page.task, Explore) else 0):
@@ -265,7 +265,7 @@ class Person:
 
 
 def happens(found: Callable[[], object], seconds: float) -> bool:
-    """Return whether it comes about within so long."""
+    """Return whether a condition becomes true within a time limit."""
     try:
         wait_for(found, "", seconds)
     except AssertionError:
@@ -274,7 +274,7 @@ def happens(found: Callable[[], object], seconds: float) -> bool:
 
 
 def laid_out(window: QWidget, size: tuple[int, int]) -> None:
-    """Show a window off screen as large as another is on one."""
+    """Show a window off screen with the size of another window."""
     window.resize(*size)
     window.show()
     window.activateWindow()
@@ -290,7 +290,7 @@ def place_in(window: QWidget, part: QWidget) -> QPoint:
 
 
 def tabs_to(window: QWidget, part: QWidget) -> int:
-    """Return how often Tab is pressed from where the keyboard is until it is on ``part``."""
+    """Return how many presses of Tab move the keyboard focus to ``part``."""
     for count in range(MOST_STOPS):
         if part.hasFocus():
             return count

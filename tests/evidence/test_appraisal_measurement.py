@@ -1,4 +1,4 @@
-"""What a scene costs and how true it is, here and in the process that answers a lab."""
+"""Cost and accuracy of a scene, in this process and in the lab's worker process."""
 
 import math
 import re
@@ -47,14 +47,14 @@ def test_the_velocity_is_worse_where_the_devices_numbers_are_unknown(
     unknown: Dynamics, now: tuple[float, float], known: tuple[float, float]
 ) -> None:
     scene = THESIS["honey"].model_copy(update={"velocity": Kalman()})
-    found = appraisal_measurement.velocity_errors(scene, unknown)
-    assert now[0] < found[0] < now[1]
-    assert known[0] < found[1] < known[1]
-    assert (found[0] > found[1]) == (unknown.assumed != ("mass_kg",))
+    errors = appraisal_measurement.velocity_errors(scene, unknown)
+    assert now[0] < errors[0] < now[1]
+    assert known[0] < errors[1] < known[1]
+    assert (errors[0] > errors[1]) == (unknown.assumed != ("mass_kg",))
 
 
 def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A reference with a tail of one element less is another liquid."""
+    """A reference with one element less in its tail is another liquid."""
     true = appraisal_measurement.reference_model.respond
 
     def shorter(scene, motion):  # type: ignore[no-untyped-def]
@@ -64,9 +64,9 @@ def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
         return true(other, motion)
 
     monkeypatch.setattr(appraisal_measurement.reference_model, "respond", shorter)
-    found = appraisal_measurement.errors(THESIS["light_oil"])
-    assert found.wake is not None
-    assert found.wake > 1e-4
+    errors = appraisal_measurement.errors(THESIS["light_oil"])
+    assert errors.wake is not None
+    assert errors.wake > 1e-4
 
 
 def test_an_exploration_may_be_shaken_and_a_reach_goes_as_far_as_its_targets() -> None:
@@ -84,7 +84,7 @@ def test_an_exploration_may_be_shaken_and_a_reach_goes_as_far_as_its_targets() -
     assert stroke.frequency_hz == pytest.approx(1 / 0.6)
 
 
-def test_what_is_withheld_depends_on_the_device_and_the_rate() -> None:
+def test_the_withheld_share_depends_on_the_device_and_the_rate() -> None:
     scene = THESIS["light_oil"]
     usual = withheld_share(scene, QUICK, Dynamics(1e-3))
     light = withheld_share(scene, QUICK, Dynamics(1e-3, mass_kg=0.02))
@@ -105,9 +105,9 @@ def test_the_process_answers_the_newest_question_and_ends_when_closed() -> None:
         newest = worker.order(Question(THESIS["light_oil"], QUICK, device))
         answered: dict[int, list[object]] = {}
         while len(answered.get(newest, [])) < 2:
-            told = worker.answers(wait_s=120.0)  # the first time it compiles
-            assert told
-            for number, answer in told:
+            answers = worker.answers(wait_s=120.0)  # the first time it compiles
+            assert answers
+            for number, answer in answers:
                 answered.setdefault(number, []).append(answer)
         assert answered[1][-1] is None, "it was given up for the newer one"
         first, second = answered[newest]
@@ -126,12 +126,12 @@ def test_the_process_answers_the_newest_question_and_ends_when_closed() -> None:
     assert worker.answers() == []
 
 
-def test_what_cannot_be_measured_is_said() -> None:
+def test_an_unstable_scene_is_refused() -> None:
     wild = THESIS["water"].model_copy(update={"rate_hz": 100.0})  # slower than any loop that is known to be stable
-    told: list[object] = []
+    answers: list[object] = []
     with pytest.raises(StudyError, match="no force has been shown to be stable"):
-        appraise(Question(wild), told.append, lambda: False)
-    assert told == []
+        appraise(Question(wild), answers.append, lambda: False)
+    assert answers == []
 
 
 STROKES = MotionBox(speed_mps=0.6, acceleration_mps2=6)
@@ -142,18 +142,18 @@ STROKES = MotionBox(speed_mps=0.6, acceleration_mps2=6)
 @pytest.mark.slow
 def test_non_newtonian_liquids_are_compared_with_their_law_added_mass_and_buoyancy(name):
     whole = tank(name, scale=3.0, effects=("non_newtonian", "added_mass", "buoyancy"), motion=STROKES)
-    found = expected(whole)
-    assert found.causes.law < 0.05
-    assert 0.03 < found.error_share < 0.2 + found.causes.limits
+    expected_error = expected(whole)
+    assert expected_error.causes.law < 0.05
+    assert 0.03 < expected_error.error_share < 0.2 + expected_error.causes.limits
     known = expected(whole.model_copy(update={"velocity": Given()}))
     assert known.error_share < 0.05 + known.causes.limits
     lacking = expected(tank(name, scale=3.0, motion=STROKES))
-    assert lacking.causes.law > found.causes.law + 0.02
+    assert lacking.causes.law > expected_error.causes.law + 0.02
     assert f"{PRESETS[name][1].kind} law (no reference in unsteady flow)" in error_report(whole)
 
 
 @pytest.mark.slow
-def test_scene_states_what_acts_of_each_part_at_two_and_three_ticks_and_offers_kalman():
+def test_the_scene_report_states_the_acting_share_of_each_part_and_offers_kalman():
     own, offered = acting_report(load_scene("rek2024", "water")).splitlines()
     pattern = (
         r"with 2 ticks of delay, the hand receives \d+ % of the drag and (\d+) % of the wake \(error [\d.]+ %\); "
@@ -181,7 +181,7 @@ BOTH = Scene(accuracy=STEADY, scale=3, liquids=(RIVER, POOL))
 
 
 class Clock:
-    """Says how long each batch took, by the scene it was of: a stopwatch under the test's control."""
+    """A stopwatch under the test's control: the time of each batch follows from its scene."""
 
     def __init__(self, monkeypatch, cost_ns):
         self.now_ns = 0
@@ -203,7 +203,7 @@ class Clock:
 PRICES = {"drag": 2, "wake": 40, "current": 5, "buoyancy": 3, "surface": 7, "added_mass": 11, "history": 90}
 
 
-def test_each_effect_costs_what_it_adds(monkeypatch):
+def test_the_cost_of_each_effect_is_its_added_time(monkeypatch):
     Clock(monkeypatch, lambda scene: 20 + sum(PRICES[it] for liquid in scene.liquids for it in liquid.effects))
     measured = measure(BOTH, batches=3)
     expected = {("river", name): PRICES[name] for name in PRICES if name != "surface"}
@@ -227,10 +227,10 @@ def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):
 def test_the_worker_predicts_the_trials_out_of_limits_on_a_slow_device() -> None:
     """On a loop of two ticks half the force of slime is withheld, which is one of the study's five liquids."""
     sent: list[object] = []
-    found = appraise(DeliveryQuestion(load("slime"), 2), sent.append, lambda: False)
-    assert isinstance(found, PredictedDelivery)
-    assert (found.missing, found.asked, found.judged, found.limit_percent) == (0, 0, 5, 25)
-    assert found.out >= 1
+    prediction = appraise(DeliveryQuestion(load("slime"), 2), sent.append, lambda: False)
+    assert isinstance(prediction, PredictedDelivery)
+    assert (prediction.missing, prediction.asked, prediction.judged, prediction.limit_percent) == (0, 0, 5, 25)
+    assert prediction.out >= 1
     at_one_tick = appraise(DeliveryQuestion(load("slime"), 1), sent.append, lambda: False)
     assert isinstance(at_one_tick, PredictedDelivery)
     assert at_one_tick.out == 0

@@ -1,4 +1,4 @@
-"""The definition itself, against lists worked out by hand."""
+"""The reference model, compared with values computed by hand."""
 
 import numpy as np
 import pytest
@@ -60,11 +60,11 @@ def test_the_force_is_the_drag_of_the_relative_velocity():
     wake = Wake(length=2, scaling=4, decay=1, breaking_span_m=0)
     liquid = Liquid(id="water", density_kg_m3=1000, effects=("drag", "wake"), wake=wake)
     motion = Motion(np.arange(3) / 1000, np.zeros((3, 3)), velocity_mps=np.tile(X, (3, 1)))
-    felt = respond(Scene(liquids=(liquid,), velocity=Given()), motion)
+    response = respond(Scene(liquids=(liquid,), velocity=Given()), motion)
     factor = 0.5 * 1000 * 0.47 * np.pi * 0.034**2
-    assert felt.wake_mps[:, 0] == pytest.approx([0, 0.25, 0.5])
-    assert felt.force_n[:, 0] == pytest.approx(-factor * np.array([1, 0.75, 0.5]) ** 2)
-    assert felt.size_mps == pytest.approx([0, 0.25, 0.5])
+    assert response.wake_mps[:, 0] == pytest.approx([0, 0.25, 0.5])
+    assert response.force_n[:, 0] == pytest.approx(-factor * np.array([1, 0.75, 0.5]) ** 2)
+    assert response.size_mps == pytest.approx([0, 0.25, 0.5])
 
 
 def test_filtering_other_than_ewma_is_not_defined():

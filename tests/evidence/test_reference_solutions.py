@@ -24,7 +24,7 @@ def scene(liquid=HONEY, **fields):
     return Scene(**{"liquids": (liquid,), "velocity": Given(), "motion": BOX, **fields})
 
 
-def test_the_exact_sums_are_those_of_fractions():
+def test_the_exact_sums_equal_those_of_fractions():
     """A straight motion whose speeds span fifteen decades: one segment, so Σ|e|/S by exact arithmetic."""
     speeds = np.tile([1e6, 1e-2, 3e-3, 1e5 / 3], 60)
     v = np.column_stack([speeds, np.zeros((len(speeds), 2))])
@@ -45,8 +45,8 @@ def test_the_definition_knows_every_law_of_drag():
         ("haider-levenspiel", 1 + 0.1806 * reynolds**0.6459 + 0.4251 / 24 * reynolds / (1 + 6880.95 / reynolds)),
         ("brown-lawler", 1 + 0.15 * reynolds**0.681 + 0.407 / 24 * reynolds / (1 + 8710 / reynolds)),
     ):
-        felt = respond(scene(HONEY.model_copy(update={"drag": Drag(law=law)})), motion).force_n
-        assert felt[1, 0] == pytest.approx(-stokes_n * over_stokes)
+        force_n = respond(scene(HONEY.model_copy(update={"drag": Drag(law=law)})), motion).force_n
+        assert force_n[1, 0] == pytest.approx(-stokes_n * over_stokes)
 
 
 def test_measured_drag_goes_through_the_points_and_is_smooth_between_them():

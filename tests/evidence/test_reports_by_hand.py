@@ -43,7 +43,7 @@ STEPS = np.arange(11)
 """Percentiles of 0 to 10 are a tenth of their number."""
 
 
-def shown(
+def shown_frames(
     load: Any, delay_ms: float, *errors_ms: float, screen: str = "100 Hz", painted_ms: Any = (0, 10, 20, 30, 40)
 ) -> Shown:
     """Return five frames with errors, by default one in each refresh of 10 ms."""
@@ -55,10 +55,10 @@ def shown(
 DELAYED = Delayed(
     "a computer", 7, (640, 480),
     (
-        shown("none", 50, 2, 4, 6, 8, 20, painted_ms=(0, 10, 40, 50, 60)),
-        shown("none", 0, 1, 2, 3, 4, 5),
-        shown("gui", 0, 3, 3, 3, 3, 3),
-        shown("gui", 50, -1, 0, 1, 2, 3, painted_ms=(0, 20, 40, 60, 80)),
+        shown_frames("none", 50, 2, 4, 6, 8, 20, painted_ms=(0, 10, 40, 50, 60)),
+        shown_frames("none", 0, 1, 2, 3, 4, 5),
+        shown_frames("gui", 0, 3, 3, 3, 3, 3),
+        shown_frames("gui", 50, -1, 0, 1, 2, 3, painted_ms=(0, 20, 40, 60, 80)),
     ),
 )  # fmt: skip
 
@@ -131,17 +131,17 @@ ROWS = (
 )  # fmt: skip
 
 
-def withheld(liquid: str, estimator: str, mode: str, *percents: float, most: float = 0.2) -> Withheld:
+def withheld_shares(liquid: str, estimator: str, mode: str, *percents: float, most: float = 0.2) -> Withheld:
     """Return the shares of seven strokes, and after four shakes: 1, 0.2 … in their seconds, times the shake."""
     after = tuple(tuple(shake * share / 100 for share in (1.0, most, 0.1, 0.05)) for shake in (1, 2, 3, 1))
     return Withheld(liquid, estimator, mode, tuple(percent / 100 for percent in percents), after)
 
 
 WITHHELD = (
-    withheld("water", "ewma", "position imposed", 0, 1, 2, 3, 5, 4, 0.5, most=0.1),
-    withheld("physical_tar", "ewma", "position imposed", 10, 20, 30, 40, 50, 60, 70, most=0.9),
-    withheld("physical_honey", "kalman", "handle held", 1, 2, 3, 4, 7.5, 6, 5, most=0.1),
-    withheld("water", "kalman", "hand shaken", 9, 9, 9, 9, 9, 9, 9),
+    withheld_shares("water", "ewma", "position imposed", 0, 1, 2, 3, 5, 4, 0.5, most=0.1),
+    withheld_shares("physical_tar", "ewma", "position imposed", 10, 20, 30, 40, 50, 60, 70, most=0.9),
+    withheld_shares("physical_honey", "kalman", "handle held", 1, 2, 3, 4, 7.5, 6, 5, most=0.1),
+    withheld_shares("water", "kalman", "hand shaken", 9, 9, 9, 9, 9, 9, 9),
 )
 RATES = tuple(
     Rate(cell=cell, participants=n, what=what, limit=limit, hits=hits, studies=studies)
@@ -175,21 +175,21 @@ def reports() -> Iterator[tuple[str, Evidence]]:
     yield "velocity", velocity_evidence(ROWS)
     yield "velocity, met", velocity_evidence((ROWS[0], *ROWS[2:]))
     yield "withheld", withheld_force_evidence(WITHHELD)
-    yield "withheld, beyond", withheld_force_evidence((withheld("water", "ewma", "handle held", *[5.1] * 7),))
+    yield "withheld, beyond", withheld_force_evidence((withheld_shares("water", "ewma", "handle held", *[5.1] * 7),))
     yield "rates", report_rates_evidence(RATES, "# Rates")
     yield "known values", known_values.known_values_evidence(KNOWN, "# Values")
     yield "known values, met", known_values.known_values_evidence(KNOWN[:1], "# Values")
 
 
 def lines() -> Iterator[str]:
-    """Yield every report; texts that a file repeats, and the usual case, are named."""
+    """Yield the lines of every report, with names in place of repeated texts and the usual case."""
     for name, evidence in reports():
         ends = f"missed: {evidence.missed}, undecided: {evidence.undecided}, closing: {evidence.closing}"
         yield from (f"== {name}", ends, *evidence.text.splitlines())
         for file, content in evidence.files.items():
             yield f"-- {file}"
-            told = content.replace(evidence.text, "(what is printed)\n").replace(str(Case()), "(the usual case)")
-            yield from told.splitlines()
+            shortened = content.replace(evidence.text, "(what is printed)\n").replace(str(Case()), "(the usual case)")
+            yield from shortened.splitlines()
     yield "== verdicts in words"
     yield from map(verdict_text, (OFF[0], ON[0], ON[2], verdict("not finite"), verdict("noise", plant=FALCON)))
 

@@ -21,7 +21,7 @@ GOLDEN = Path(__file__).parent / "golden"
 
 
 def candidate(rng: np.random.Generator) -> Any:
-    """Return what a report reads of a candidate."""
+    """Return a candidate with the fields that a report reads."""
     family = filled(typing.get_type_hints(typing.get_type_hints(comparison.Row)["candidate"])["family"], rng)
     name, rate = filled(str, rng), float(rng.choice([250, 1000]))
     return namedtuple("Candidate", "name label family rate_hz counted")(name, name[:4], family, rate, bool(rate < 500))
@@ -35,23 +35,23 @@ QUICK = {"noticed_delays-markdown": noticed_delays.noticed_delays_evidence}
 SLOW = {
     "accuracy_report-write": accuracy_report.accuracy_evidence,
 }  # fmt: skip
-REPORTS = (*QUICK.items(), *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW.items()))
+REPORTS = (*QUICK.items(), *(pytest.param(*report, marks=pytest.mark.slow) for report in SLOW.items()))
 
 
 def lines_of(make: Callable[..., Any], seed: int, folder: Path, *, files: bool) -> Iterator[str]:
-    """Yield what a function returns or writes of results."""
+    """Yield the lines that a function returns or writes for made-up results."""
     rng = np.random.default_rng(seed)
     hints = typing.get_type_hints(make)
     written = [
         folder if kind is Path else filled(kind, rng, **GIVEN) for name, kind in hints.items() if name != "return"
     ]
-    made = make(*written)
-    if isinstance(made, Evidence):
-        made = made.write(folder) if files else made.text
-    if not isinstance(made, tuple):
-        yield made.decode() if isinstance(made, bytes) else str(made)
+    output = make(*written)
+    if isinstance(output, Evidence):
+        output = output.write(folder) if files else output.text
+    if not isinstance(output, tuple):
+        yield output.decode() if isinstance(output, bytes) else str(output)
         return
-    for path in sorted(one for one in made if one.suffix != ".svg"):
+    for path in sorted(path for path in output if path.suffix != ".svg"):
         content = path.read_bytes()
         yield f"-- {path.name}"
         yield from figure_words(content) if content.startswith(b"\x89PNG") else content.decode().splitlines()
@@ -63,5 +63,5 @@ def test_reports_of_results(
 ) -> None:
     monkeypatch.setattr(Figure, "savefig", lambda figure, to, **_: to.write(stub_png(figure)))
     files = name.endswith("write")
-    found = [line for seed in range(2) for line in (f"== {seed}", *lines_of(make, seed, tmp_path, files=files))]
-    compare(GOLDEN / f"{name}.txt", each_once(found), pytestconfig, mask=CHANGING)
+    lines = [line for seed in range(2) for line in (f"== {seed}", *lines_of(make, seed, tmp_path, files=files))]
+    compare(GOLDEN / f"{name}.txt", each_once(lines), pytestconfig, mask=CHANGING)

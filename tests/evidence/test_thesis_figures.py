@@ -18,7 +18,7 @@ def size(vectors_n):
     return np.linalg.norm(vectors_n, axis=1)
 
 
-def along(vectors_n, run):
+def component_along(vectors_n, run):
     """Return the part (n,) of each vector along the motion."""
     return (vectors_n * run.motion.velocity_mps).sum(axis=1)
 
@@ -28,35 +28,35 @@ def force(run):
     return vectors(run.table, "force")
 
 
-def tick_of(shown, word):
+def tick_of(figure, word):
     """Return the row of an event."""
-    ((time_s, _),) = [event for event in shown.events if event[1] == word]
-    return int(np.searchsorted(shown.runs[0].motion.t_s, time_s))
+    ((time_s, _),) = [event for event in figure.events if event[1] == word]
+    return int(np.searchsorted(figure.runs[0].motion.t_s, time_s))
 
 
 def test_figure_3_constant_force_against_the_motion_and_none_from_the_stop_on():
-    shown = figure_3()
-    (run,), stop = shown.runs, tick_of(shown, "stop")
+    figure = figure_3()
+    (run,), stop = figure.runs, tick_of(figure, "stop")
     assert size(force(run))[:stop] == pytest.approx(INITIAL_N)
-    assert along(force(run), run)[:stop] == pytest.approx(-INITIAL_N)
+    assert component_along(force(run), run)[:stop] == pytest.approx(-INITIAL_N)
     assert run.motion.velocity_mps[stop - 1].any()
     assert not force(run)[stop:].any()
 
 
 def test_figure_4_the_relative_speed_falls_linearly_and_the_force_as_its_square():
-    shown = figure_4()
-    (run,), stop = shown.runs, tick_of(shown, "stop")
+    figure = figure_4()
+    (run,), stop = figure.runs, tick_of(figure, "stop")
     relative = size(run.motion.velocity_mps - vectors(run.table, "wake"))[:stop]
     slope, start = np.polyfit(np.arange(stop), relative, 1)
     assert (slope * LENGTH, start) == pytest.approx((-0.94, 1.0), abs=0.03)
     assert abs(slope * np.arange(stop) + start - relative).max() < 0.01
     assert size(force(run))[:stop] == pytest.approx(INITIAL_N * relative**2)
-    assert (along(force(run), run)[:stop] < 0).all()
+    assert (component_along(force(run), run)[:stop] < 0).all()
 
 
 def test_figure_4_after_the_stop_a_push_along_the_former_motion_that_ends():
-    shown = figure_4()
-    (run,), stop = shown.runs, tick_of(shown, "stop")
+    figure = figure_4()
+    (run,), stop = figure.runs, tick_of(figure, "stop")
     push = force(run)[stop:]
     assert push[0] @ run.motion.velocity_mps[stop - 1] == pytest.approx(size(push)[0])
     assert 0.85 * INITIAL_N < size(push)[0] < 0.95 * INITIAL_N
@@ -65,14 +65,14 @@ def test_figure_4_after_the_stop_a_push_along_the_former_motion_that_ends():
 
 
 def test_figure_5_a_jump_above_plain_drag_then_the_fall_after_the_stop():
-    shown = figure_5()
-    (run,), turn, stop = shown.runs, tick_of(shown, "turn back"), tick_of(shown, "stop")
-    felt = size(force(run))
-    assert felt[turn - 1] < 0.05 * INITIAL_N
-    assert felt[turn] > 3 * INITIAL_N
-    assert (along(force(run), run)[turn : turn + 500] < 0).all()
-    assert felt[stop] < felt[stop - 1]
-    assert felt[-1] == 0.0
+    figure = figure_5()
+    (run,), turn, stop = figure.runs, tick_of(figure, "turn back"), tick_of(figure, "stop")
+    force_n = size(force(run))
+    assert force_n[turn - 1] < 0.05 * INITIAL_N
+    assert force_n[turn] > 3 * INITIAL_N
+    assert (component_along(force(run), run)[turn : turn + 500] < 0).all()
+    assert force_n[stop] < force_n[stop - 1]
+    assert force_n[-1] == 0.0
 
 
 @pytest.mark.slow
@@ -94,14 +94,14 @@ def test_figure_8_the_wake_fills_as_the_power_of_the_share_that_is_filled():
 
 @pytest.mark.slow
 def test_every_figure_has_its_number_title_and_caption():
-    made = [make() for make in FIGURES]
-    assert [shown.number for shown in made] == list(range(3, 3 + len(made)))
-    for shown in made:
-        drawn = thesis_figures.draw(shown)
+    figures = [make() for make in FIGURES]
+    assert [figure.number for figure in figures] == list(range(3, 3 + len(figures)))
+    for figure in figures:
+        drawn = thesis_figures.draw(figure)
         words = " ".join(text.get_text().replace("\n", " ") for text in drawn.texts)
-        assert f"Fig. {shown.number}" in words
-        assert shown.title in words
-        assert shown.caption in words
+        assert f"Fig. {figure.number}" in words
+        assert figure.title in words
+        assert figure.caption in words
 
 
 def test_a_folder_that_cannot_be_is_named(tmp_path):

@@ -1,4 +1,4 @@
-"""Tests with windows are left out where Qt cannot be loaded."""
+"""Tests with windows are skipped if Qt cannot be loaded."""
 
 try:
     import PySide6.QtWidgets  # noqa: F401

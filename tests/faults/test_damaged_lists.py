@@ -1,4 +1,4 @@
-"""Small files besides the sessions, damaged at random with fixed seeds: whatever reads one says so, or reads values."""
+"""Damaged small files besides the sessions (fixed seeds): a reader reports the damage or reads valid values."""
 
 import contextlib
 import json
@@ -62,13 +62,13 @@ COMMITMENT = preregistration.Commitment(
 
 
 def read_workspace(_folder: Path) -> object:
-    made = workspace.workspace()
-    return made.own_protocols(), made.results.is_dir()
+    current = workspace.workspace()
+    return current.own_protocols(), current.results.is_dir()
 
 
 def use_commitment(folder: Path) -> object:
-    found = preregistration.read_commitment(folder)
-    return found and (found.protocol_hash[:12], set(found.rules))
+    commitment = preregistration.read_commitment(folder)
+    return commitment and (commitment.protocol_hash[:12], set(commitment.rules))
 
 
 KINDS: dict[str, tuple[Callable[[Path], Path], str, Callable[[Path], object]]] = {
@@ -103,7 +103,7 @@ KINDS: dict[str, tuple[Callable[[Path], Path], str, Callable[[Path], object]]] =
     "outputs": (
         lambda _: data_folder() / "outputs.jsonl",
         '{"study": "STUDY", "to": "/tmp", "at": "now", "files": ["a.csv"]}\n',
-        lambda f: [one.paths for one in outputs(f)],
+        lambda f: [output.paths for output in outputs(f)],
     ),
     "draft": (
         lambda f: data_folder() / "drafts" / f"{drafts.file_key(f / 'x.toml')}.json",
@@ -139,7 +139,7 @@ def test_a_damaged_file_is_an_error_for_people_and_never_a_traceback(
     path = place(tmp_path)
     path.parent.mkdir(parents=True, exist_ok=True)
     names = {"STUDY": tmp_path, "FILE": tmp_path / "x.toml"}
-    content = re.sub("STUDY|FILE", lambda found: json.dumps(str(names[found[0]]))[1:-1], text).encode()
+    content = re.sub("STUDY|FILE", lambda match: json.dumps(str(names[match[0]]))[1:-1], text).encode()
     path.write_bytes(content)
     assert read(tmp_path), kind
     errors: list[Any] = []

@@ -1,4 +1,4 @@
-"""A disk that takes nothing: before a session it is refused, within one it waits, and nothing is lost or doubled."""
+"""A full disk: it prevents a session, a running session waits, and no data are lost or doubled."""
 
 import csv
 import shutil
@@ -114,7 +114,7 @@ def test_a_fault_at_any_call_of_the_disk_leaves_a_session_that_begins_and_ends_s
     raise AssertionError("the session never ended")
 
 
-def opened(study: Path) -> None:
+def unblind_completely(study: Path) -> None:
     if (left := unblind(study, "AK", "closed").left) != ():
         raise StoreError("\n".join(left))
 
@@ -133,7 +133,7 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     "command",
     [
-        opened,
+        unblind_completely,
         lambda study: withdraw(study, "P002", by="AK", reason="asked"),
         lambda study: rebuild_session(study / P001),
     ],
@@ -144,7 +144,7 @@ def test_a_command_that_met_a_fault_at_any_call_of_the_disk_is_given_again(
 ) -> None:
     for call in range(MOST_CALLS):
         study, used = shutil.copytree(answered, tmp_path / f"{call:03d}"), disk.Disk(kind, call)
-        for table in [] if command is opened else (study / P001).glob("*_data.csv"):
+        for table in [] if command is unblind_completely else (study / P001).glob("*_data.csv"):
             table.unlink()
         with used.used():
             disk.tried(partial(command, study))

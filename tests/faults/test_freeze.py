@@ -1,4 +1,4 @@
-"""A program that stands still within a trial: the trial is interrupted, its row says why, and it comes again."""
+"""A program that freezes in a trial: the trial is interrupted with a reason and presented again."""
 
 import csv
 import os
@@ -28,7 +28,7 @@ pytestmark = [
 
 
 def held_with_a_freeze(folder: Path) -> tuple[dict[str, str], dict[str, str]]:
-    """Hold a session that stands still in its first trial; return that trial's rows, the interrupted and the next."""
+    """Hold a session that freezes in its first trial; return the rows of the interrupted and the next attempt."""
     program = subprocess.Popen(
         [sys.executable, "-m", "tests.faults.support.frozen", str(folder)],
         cwd=Path(__file__).parents[2],

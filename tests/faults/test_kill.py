@@ -26,8 +26,8 @@ pytestmark = [pytest.mark.slow, needs_servo, needs_fork]
 
 
 def session(study: Path) -> SessionFolder:
-    (found,) = StudyFolder(study).sessions()
-    return found
+    (folder,) = StudyFolder(study).sessions()
+    return folder
 
 
 def rows(study: Path, name: str) -> list[dict[str, str]]:
@@ -37,23 +37,23 @@ def rows(study: Path, name: str) -> list[dict[str, str]]:
 
 def answers(study: Path) -> list[dict[str, str]]:
     """Return the responses of each trial's last attempt without times and attempts."""
-    found = rows(study, "responses")
-    last = {(row["trial"], row["attempt"]) for row in session_tables.latest_attempts(typed(found))}
+    response_rows = rows(study, "responses")
+    last = {(row["trial"], row["attempt"]) for row in session_tables.latest_attempts(with_numbers(response_rows))}
     return [
         {name: cell for name, cell in row.items() if name not in TIMES}
-        for row in found
+        for row in response_rows
         if (int(row["trial"]), int(row["attempt"])) in last
     ]
 
 
-def typed(found: list[dict[str, str]]) -> list[dict[str, Any]]:
-    return [{**row, "trial": int(row["trial"]), "attempt": int(row["attempt"])} for row in found]
+def with_numbers(response_rows: list[dict[str, str]]) -> list[dict[str, Any]]:
+    return [{**row, "trial": int(row["trial"]), "attempt": int(row["attempt"])} for row in response_rows]
 
 
 def last_attempts(study: Path) -> list[tuple[str, ...]]:
     return [
         tuple(str(row[name]) for name in WHAT_RAN)
-        for row in session_tables.latest_attempts(typed(rows(study, "trials")))
+        for row in session_tables.latest_attempts(with_numbers(rows(study, "trials")))
     ]
 
 
@@ -89,15 +89,15 @@ def test_killed_at_random_moments_a_session_is_completed_as_if_nothing_had_been(
         assert answers(study) == answers(whole)
         assert last_attempts(study) == last_attempts(whole)
         assert len(answers(study)) == short.ANSWERS == orders_of(load(str(tmp_path / "short.toml"))).answers
-        told_answers(before, rows(study, "responses"))
+        assert_answers_in_table(before, rows(study, "responses"))
     assert interrupted >= count / 3
     study = next(Path(outcome["folder"]) for outcome in outcomes if outcome["resumed"] == 0)
     assert verify_study(study).errors == ()
 
 
-def told_answers(held: list[str], found: list[dict[str, str]]) -> None:
-    """Assert that every answer that was confirmed before the kill stands in the table, with the value it had."""
-    table = {(row["trial"], row["attempt"], row["item"]): row["response"] for row in found}
+def assert_answers_in_table(held: list[str], response_rows: list[dict[str, str]]) -> None:
+    """Assert that the table contains every answer confirmed before the kill, with its value."""
+    table = {(row["trial"], row["attempt"], row["item"]): row["response"] for row in response_rows}
     for line in map(json.loads, held):
-        for given in line["items"] if line["event"] == "responses" else ():
-            assert table[str(line["trial"]), str(line["attempt"]), given["item"]] == str(given["value"])
+        for answer in line["items"] if line["event"] == "responses" else ():
+            assert table[str(line["trial"]), str(line["attempt"]), answer["item"]] == str(answer["value"])

@@ -1,4 +1,4 @@
-"""Commands on results, killed at any moment: no file is half there, and the next run ends as if nothing had been."""
+"""Commands on results, killed at any moment: no file is partial, and the next run ends as if undisturbed."""
 
 import signal
 from pathlib import Path
@@ -22,8 +22,8 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     return outcomes_of("command_killer", short.write(folder), folder, 1)
 
 
-def seen(files: dict[str, str]) -> dict[str, str]:
-    """Return the files that are neither half-written nor tell when something was done."""
+def stable_files(files: dict[str, str]) -> dict[str, str]:
+    """Return the files that are neither partly written nor contain times."""
     told_when = {"rebuilt.txt", "checksums.sha256", "reveals.jsonl"}
     return {
         path: held
@@ -42,10 +42,10 @@ def test_every_file_is_as_before_or_as_after_and_the_next_run_finishes_them(
     assert len(killed) == COMMANDS[command][0]
     assert any(outcome["code"] == -signal.SIGKILL for outcome in outcomes)  # some end before they are killed
     for outcome in killed:
-        for name, held in seen(outcome["held"]).items():
+        for name, held in stable_files(outcome["held"]).items():
             assert held in (outcome["before"].get(name), whole["left"][name]), (outcome["after_s"], name)
         assert outcome["again"] == 0, outcome["after_s"]
-        assert seen(outcome["left"]) == seen(whole["left"])
+        assert stable_files(outcome["left"]) == stable_files(whole["left"])
 
 
 @pytest.mark.parametrize("command", ["rebuild", "unblind"])

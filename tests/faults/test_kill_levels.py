@@ -1,4 +1,4 @@
-"""A session with levels killed at random bytes of its journal presents, when it is resumed, what it would have."""
+"""A session with levels, killed at random bytes of its journal and resumed, presents what it would have presented."""
 
 import os
 from pathlib import Path
@@ -31,17 +31,17 @@ OF_TRIALS = {"trial_started", "interval_started", "interval_ended", "trial_ended
 pytestmark = [pytest.mark.slow, needs_servo, needs_fork, pytest.mark.timeout(300 + 60 * KILLS)]
 
 
-def told(study: Path) -> dict[tuple[Any, ...], Any]:
-    """Return what a journal says of the last attempt at each trial, sealed fields opened, without times and measures.
+def recorded_events(study: Path) -> dict[tuple[Any, ...], Any]:
+    """Return a journal's events of the last attempt at each trial, unsealed, without times and measurements.
 
-    What was measured is left out: the simulated hand is elsewhere after a break, and the force fades in anew.
+    Measurements differ: after a break the simulated hand is elsewhere, and the force fades in again.
     """
     (session,) = StudyFolder(study).sessions()
-    found: dict[tuple[Any, ...], Any] = {}
+    events: dict[tuple[Any, ...], Any] = {}
     for line in raw(open_events(journal.read(session.journal), read_key(study))):
         if line["event"] in OF_TRIALS:
-            found[line["event"], line.get("trial", line.get("page")), line.get("interval")] = comparable(line)
-    return found
+            events[line["event"], line.get("trial", line.get("page")), line.get("interval")] = comparable(line)
+    return events
 
 
 def comparable(value: Any) -> Any:
@@ -70,7 +70,7 @@ def test_a_session_killed_at_random_bytes_of_its_journal_equals_one_that_was_not
     protocol = tmp_path / "levels.toml"
     protocol.write_text(text, encoding="utf-8", newline="\n")
     outcomes = outcomes_of("killer", protocol, tmp_path, KILLS, 3, "bytes", limit_s=240 + 50 * KILLS)
-    whole = told(tmp_path / "whole")
+    whole = recorded_events(tmp_path / "whole")
     assert sum(event == "trial_started" for event, *_ in whole) >= 7
     assert all("level" in line for (event, *_), line in whole.items() if event == "trial_started")
     killed = [outcome for outcome in outcomes if outcome["resumed"] is not None]
@@ -80,12 +80,12 @@ def test_a_session_killed_at_random_bytes_of_its_journal_equals_one_that_was_not
         assert outcome["resumed"] == 0, outcome
         (session,) = StudyFolder(study).sessions()
         assert session.journal.read_text(encoding="utf-8").startswith(outcome["held"].rpartition("\n")[0])
-        equals(study, whole)
+        assert_same_session(study, whole)
 
 
-def equals(study: Path, whole: dict[tuple[Any, ...], Any]) -> None:
-    """Assert that a study's only session says what an uninterrupted one does, and that nothing is wrong with it."""
-    assert told(study) == whole, study
+def assert_same_session(study: Path, whole: dict[tuple[Any, ...], Any]) -> None:
+    """Assert that a study's only session is sound and has the same events as an uninterrupted one."""
+    assert recorded_events(study) == whole, study
     (session,) = StudyFolder(study).sessions()
     assert reproduce_session(session.path).differences == []
     assert verify_study(study, None).errors == ()
@@ -103,4 +103,4 @@ def test_one_session_killed_again_and_again_equals_one_that_was_not(tmp_path: Pa
     (session,) = StudyFolder(study).sessions()
     events = [line["event"] for line in raw(journal.read(session.journal))]
     assert events.count("session_resumed") > 0.5 * KILLS
-    equals(study, told(tmp_path / "whole"))
+    assert_same_session(study, recorded_events(tmp_path / "whole"))

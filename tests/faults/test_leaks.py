@@ -1,4 +1,4 @@
-"""A session to its end: nothing that can be read tells a condition, nor, while it is double-blind, can be seen."""
+"""A whole session: no readable file reveals a condition, nor does a window while the study is double-blind."""
 
 import logging
 import re
@@ -58,37 +58,39 @@ def concealed(tmp_path: Path, blinding: str) -> Path:
     path = short.write(tmp_path)
     text = path.read_text(encoding="utf-8")
     for pattern, word in (*CONCEALED, (r'blinding = "double"', f'blinding = "{blinding}"')):
-        text, found = re.subn(pattern, word, text)
-        assert found, pattern
+        text, count = re.subn(pattern, word, text)
+        assert count, pattern
     path.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 
 @dataclass
-class Held:
-    """What a session said to anybody, and what its windows were."""
+class HeldSession:
+    """The messages of a session, and the contents of its windows."""
 
     words: set[str] = field(default_factory=set)
-    told: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
     tasks: set[int] = field(default_factory=set)
     forces_plotted: set[bool] = field(default_factory=set)
 
 
-def held(protocol: Path, results: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> Held:
+def hold_session(
+    protocol: Path, results: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> HeldSession:
     """Hold a session of the scripted device to its end; read every window at every look."""
     monkeypatch.setattr(start, "MEASURED_S", 0.1)
     caplog.set_level(logging.DEBUG)
-    found = Held()
+    session = HeldSession()
 
     def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         for top in QApplication.topLevelWidgets():
-            found.words.update(words_of(top))
-        found.words.update(traces_of(operator))
-        found.words.add(repr(participant.page))
+            session.words.update(words_of(top))
+        session.words.update(traces_of(operator))
+        session.words.add(repr(participant.page))
         if isinstance(participant.page, TaskPage):
-            found.tasks.add(participant.page.trial)
+            session.tasks.add(participant.page.trial)
             operator.ask("mark")
-        found.forces_plotted.add(hasattr(operator.force, "plot"))
+        session.forces_plotted.add(hasattr(operator.force, "plot"))
         return False
 
     person = Person(watch)
@@ -100,33 +102,33 @@ def held(protocol: Path, results: Path, monkeypatch: pytest.MonkeyPatch, caplog:
         seed=3,
         operator="AK",
         results=results,
-        progress=found.told.append,
+        progress=session.messages.append,
     )
     person.leave()
     assert code == 0
-    found.told += [record.getMessage() for record in caplog.records]
-    return found
+    session.messages += [record.getMessage() for record in caplog.records]
+    return session
 
 
 def test_nothing_seen_written_or_logged_tells_a_condition(
     concealed: Path, blinding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     results = tmp_path / "results"
-    found = held(concealed, results, monkeypatch, caplog)
-    assert found.tasks == {1, 2, 3, 4}
+    session = hold_session(concealed, results, monkeypatch, caplog)
+    assert session.tasks == {1, 2, 3, 4}
     words = telltales(load(str(concealed)))
     assert {"quagmire", "1013.7", "1717", "137.31", "see_tardy"} <= words.words
-    shown = words
+    visible_words = words
     if blinding == "single":  # the operator sees forces and counts, which may be any short number
-        shown = Telltales(word for word in words.words if not word[0].isdigit() or len(word) > 5)
-    for text in (*found.words, *found.told):
-        assert shown.in_text(text) == [], text
+        visible_words = Telltales(word for word in words.words if not word[0].isdigit() or len(word) > 5)
+    for text in (*session.words, *session.messages):
+        assert visible_words.in_text(text) == [], text
     assert find_leaks(results, words) == []
-    assert found.forces_plotted == {blinding == "single"}
-    assert [receipt.read(one.receipt)["protocol"]["study"]["blinding"] for one in StudyFolder(results).sessions()] == [
-        blinding
-    ]
-    assert len(found.words) > 100
+    assert session.forces_plotted == {blinding == "single"}
+    assert [
+        receipt.read(folder.receipt)["protocol"]["study"]["blinding"] for folder in StudyFolder(results).sessions()
+    ] == [blinding]
+    assert len(session.words) > 100
 
 
 # Levels, standards and parameters that occur nowhere by chance.
@@ -179,13 +181,13 @@ def test_nothing_seen_written_or_logged_tells_a_level(
         text = text.replace(old, new)
     path = tmp_path / "levels.toml"
     path.write_text(text, encoding="utf-8", newline="\n")
-    found = held(path, tmp_path / "results", monkeypatch, caplog)
+    session = hold_session(path, tmp_path / "results", monkeypatch, caplog)
     protocol = load(str(path))
     (place,) = StudyFolder(tmp_path / "results").sessions()
     recorded = recorded_numbers(protocol, open_events(journal.read(place.journal), read_key(tmp_path / "results")))
     assert known <= presented_numbers(protocol) | recorded
     words = telltales(protocol, recorded)
-    for line in (*found.words, *found.told):
+    for line in (*session.words, *session.messages):
         assert words.in_text(line) == [], line
     assert find_leaks(tmp_path / "results", words) == []
-    assert any("answered" in line for line in found.words), "the operator saw how the track is doing"
+    assert any("answered" in line for line in session.words), "the operator saw how the track is doing"

@@ -1,4 +1,4 @@
-"""Results on what behaves as a network drive, as far as one computer can simulate it."""
+"""Results on a simulated network drive."""
 
 import errno
 import glob
@@ -33,17 +33,17 @@ Hide = Callable[[Path], AbstractContextManager[None]]
 
 @pytest.fixture
 def drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder without locks and links, whose entries cannot be flushed, and of which nothing is renamed to another."""
+    """Return a folder without locks and links, whose entries cannot be flushed or renamed to another folder."""
     fcntl = pytest.importorskip("fcntl", reason="imitates the errors of POSIX systems")
 
     def refuse(*_given: object, **_named: object) -> None:
         raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
 
     def within_a_folder(rename: Callable[..., None]) -> Callable[..., None]:
-        def renamed(old: Any, new: Any, **given: Any) -> None:
+        def renamed(old: Any, new: Any, **options: Any) -> None:
             if Path(old).parent != Path(new).parent:
                 raise OSError(errno.EXDEV, os.strerror(errno.EXDEV))
-            rename(old, new, **given)
+            rename(old, new, **options)
 
         return renamed
 
@@ -66,21 +66,21 @@ def test_sessions_and_commands_do_without_locks_links_and_flushes_of_folders(dri
     world.start()
     world.until(Phase.COMPLETE)
     assert verify_study(drive / "small").is_sound
-    study, asked = rehearsed(drive), ("--by", "AB", "--reason", "a test")
+    study, reason = rehearsed(drive), ("--by", "AB", "--reason", "a test")
     session = study / "data" / "sub-P001" / "ses-01"
     (session / "checksums.sha256").unlink()
     for words in (
         ("rebuild", session),
-        ("unblind", study, *asked),
-        ("exclude", study, "--participant", "P001", *asked),
-        ("include", study, "--participant", "P001", *asked),
+        ("unblind", study, *reason),
+        ("exclude", study, "--participant", "P001", *reason),
+        ("include", study, "--participant", "P001", *reason),
         ("export", study, "--to", drive / "exported"),
         ("merge", f"A={study}", "--to", drive / "merged"),
-        ("withdraw", study, "--participant", "P002", *asked),
+        ("withdraw", study, "--participant", "P002", *reason),
         ("verify", study),
     ):
-        done = CliRunner().invoke(commands, [str(word) for word in words])
-        assert done.exit_code == 0, (words, done.output, done.exception)
+        result = CliRunner().invoke(commands, [str(word) for word in words])
+        assert result.exit_code == 0, (words, result.output, result.exception)
 
 
 @pytest.mark.parametrize(("call", "number"), [("fsync", errno.EDQUOT), ("fsync", errno.EIO), ("fstat", errno.ESTALE)])
@@ -106,7 +106,7 @@ def test_a_drive_that_is_full_or_gone_at_a_flush_is_waited_for(
 
 
 class Entries(list[Any]):
-    """What ``os.scandir`` returns, of a list."""
+    """The result of ``os.scandir`` for a list of entries."""
 
     def __next__(self) -> Any:
         if not self:
@@ -121,22 +121,22 @@ class Entries(list[Any]):
 
 @pytest.fixture
 def hide(monkeypatch: pytest.MonkeyPatch) -> Hide:
-    """Let a path, and what lies below it, be seen neither in its folder nor by its name, though it is there."""
+    """Return a context manager that hides an existing path and its contents."""
 
     @contextmanager
     def hidden(path: Path) -> Iterator[None]:
         look, names, entries = os.stat, os.listdir, os.scandir
 
-        def stat_of(looked: Any, **given: Any) -> os.stat_result:
+        def stat_of(looked: Any, **options: Any) -> os.stat_result:
             if not isinstance(looked, int) and path in (Path(looked), *Path(looked).parents):
                 raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(looked))
-            return look(looked, **given)
+            return look(looked, **options)
 
         def scanned(folder: Any = ".") -> Any:
             if isinstance(folder, int):
                 return entries(folder)
-            with entries(folder) as found:
-                return Entries([entry for entry in found if Path(folder) / entry.name != path])
+            with entries(folder) as folder_entries:
+                return Entries([entry for entry in folder_entries if Path(folder) / entry.name != path])
 
         with monkeypatch.context() as patched:
             patched.setattr(os, "stat", stat_of)
@@ -150,29 +150,27 @@ def hide(monkeypatch: pytest.MonkeyPatch) -> Hide:
     return hidden
 
 
-def begun(study: Path, participant: str) -> SessionStore:
+def begin_session(study: Path, participant: str) -> SessionStore:
     return StoredWorld(study, participant).store
 
 
-def test_what_another_computer_created_and_the_drive_shows_late_is_never_created_again(
-    tmp_path: Path, hide: Hide
-) -> None:
+def test_files_of_another_computer_that_appear_late_are_never_created_again(tmp_path: Path, hide: Hide) -> None:
     study = StudyFolder(tmp_path / "study")
-    first = begun(study.path, "P001")
+    first = begin_session(study.path, "P001")
     before = {path: path.read_bytes() for path in study.path.rglob("*") if path.is_file()}
     for late, participant in ((study.session("P001", 1).path, "P001"), (study.key.parent, "P002")):
         with hide(late), pytest.raises(StoreError):
-            begun(study.path, participant)
+            begin_session(study.path, participant)
         assert before.items() <= {path: path.read_bytes() for path in study.path.rglob("*") if path.is_file()}.items()
     first.close()
-    begun(study.path, "P002").close()
+    begin_session(study.path, "P002").close()
     assert verify_study(study.path).errors == ()
 
 
 def test_of_two_programs_that_do_not_see_each_others_lock_the_first_writes_no_line_over_the_seconds(
     tmp_path: Path, hide: Hide
 ) -> None:
-    first = begun(tmp_path / "study", "P001")
+    first = begin_session(tmp_path / "study", "P001")
     (marker,) = folder_lock.markers(first.folder.path)
     with hide(marker):
         second = reopen_store(first.folder.path, small.protocol(), b"small", operator="AB", device={}, screens={})

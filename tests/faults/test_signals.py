@@ -63,13 +63,13 @@ def test_a_signal_in_a_trial_leaves_a_session_that_can_be_resumed(
         assert program.process.wait(30) == 128 + number
         ended_s = time.time() - sent_s
     finally:
-        for one in busy:
-            one.kill()
-            one.wait()
+        for process in busy:
+            process.kill()
+            process.wait()
         program.close()
     (session,) = StudyFolder(tmp_path / "results" / "demo-scripted").sessions()
-    assert [one["outcome"] for one in program.events("trial_ended")] == ["interrupted"]
-    assert [one["by"] for one in program.events("paused")] == ["program"]
+    assert [event["outcome"] for event in program.events("trial_ended")] == ["interrupted"]
+    assert [event["by"] for event in program.events("paused")] == ["program"]
     assert program.events("session_ended") == []
     zero_s = datetime.fromisoformat(program.events("trial_ended")[0]["at"]).timestamp() - sent_s
     sys.stdout.write(f"{number.name}: zero force after {zero_s:.2f} s, the end after {ended_s:.2f} s\n")

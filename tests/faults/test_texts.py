@@ -1,4 +1,4 @@
-"""What people type goes in and comes out as it was, by every reader."""
+"""Typed texts are stored and read unchanged by every reader."""
 
 import csv
 from pathlib import Path

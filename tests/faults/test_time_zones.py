@@ -1,4 +1,4 @@
-"""Data of one time zone are the same data in another, and under another default locale."""
+"""Data are the same in every time zone and default locale."""
 
 import re
 import time
@@ -25,7 +25,7 @@ pytestmark = [
 
 @pytest.fixture
 def travel(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
-    """Go to a time zone."""
+    """Switch to a time zone."""
 
     def go(zone: str) -> None:
         monkeypatch.setenv("TZ", zone)
@@ -38,7 +38,7 @@ def travel(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
 
 @pytest.fixture
 def german() -> Iterator[None]:
-    """Write numbers with a comma where nothing else is said."""
+    """Switch to a locale with decimal commas."""
     before = QLocale()
     QLocale.setDefault(QLocale("de_DE"))
     yield

@@ -53,8 +53,8 @@ PAIRS = [
 ]
 
 
-def carry_out(folder: Path, words: tuple[str, ...], start: Any, done: Any) -> None:
-    """Run a command on the folder when the other program does; report its exit code and errors."""
+def carry_out(folder: Path, words: tuple[str, ...], start: Any, outcomes: Any) -> None:
+    """Run a command on the folder together with the other program; report its exit code and errors."""
     command, *options = words
     to = [str(folder / word) if word == "exported" else word for word in options]
     sys.argv = ["liquid-study", command, str(folder / "study"), *to]
@@ -65,7 +65,7 @@ def carry_out(folder: Path, words: tuple[str, ...], start: Any, done: Any) -> No
             main()
         except SystemExit as ended:
             code = int(ended.code or 0)
-    done.put((words, code, said.getvalue()))
+    outcomes.put((words, code, said.getvalue()))
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids=" and ".join)
@@ -79,11 +79,11 @@ def test_two_programs_leave_a_sound_study(
     for number in range(ROUNDS):
         folder = tmp_path / str(number)
         shutil.copytree(study, folder / "study")
-        start, done = forking.Barrier(2), forking.SimpleQueue()
-        programs = [forking.Process(target=carry_out, args=(folder, COMMANDS[name], start, done)) for name in pair]
+        start, outcomes = forking.Barrier(2), forking.SimpleQueue()
+        programs = [forking.Process(target=carry_out, args=(folder, COMMANDS[name], start, outcomes)) for name in pair]
         for program in programs:
             program.start()
-        ended = [done.get() for _ in programs]
+        ended = [outcomes.get() for _ in programs]
         for program in programs:
             program.join(60)
             assert program.exitcode == 0
@@ -101,12 +101,12 @@ def test_two_programs_leave_a_sound_study(
             if words[0] == "withdraw":
                 assert not list((folder / "study" / "data").glob(f"sub-{words[2]}*"))
             if words[0] == "exclude":
-                kept = {one.participant for one in exclusions(folder / "study")}
+                kept = {exclusion.participant for exclusion in exclusions(folder / "study")}
                 assert words[2] in kept or any(other[0] == "withdraw" for other in effects)
 
 
 def test_of_two_programs_exactly_one_gets_each_id_and_both_have_the_same_key(tmp_path: Path) -> None:
-    """Every round in a new study: the key is raced for, too; then both take free ids and compare keys."""
+    """Each round uses a new study: both programs compete for the key, then take free IDs and compare keys."""
 
     @contextmanager
     def begun(program: int, number: int) -> Iterator[str]:

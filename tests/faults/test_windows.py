@@ -1,4 +1,4 @@
-"""Windows that are closed, by whomever: zero force, everything kept, and a last line that says how it ended."""
+"""Closed windows end in zero force, with all data stored and a last journal line that states the end."""
 
 import signal
 from pathlib import Path
@@ -29,10 +29,10 @@ pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
 def machines(monkeypatch: pytest.MonkeyPatch) -> list[Rig]:
     """Return the machines that are opened; the pre-flight takes a tenth of a second."""
     monkeypatch.setattr(start, "MEASURED_S", 0.1)
-    opened: list[Rig] = []
+    rigs: list[Rig] = []
     open_rig = live_session.open_rig
-    monkeypatch.setattr(live_session, "open_rig", lambda *a, **k: opened.append(open_rig(*a, **k)) or opened[-1])
-    return opened
+    monkeypatch.setattr(live_session, "open_rig", lambda *a, **k: rigs.append(open_rig(*a, **k)) or rigs[-1])
+    return rigs
 
 
 def hold(folder: Path, watch: Any) -> tuple[int | str, list[dict[str, Any]]]:
@@ -57,21 +57,21 @@ def in_tank(participant: ParticipantWindow) -> bool:
 
 @pytest.mark.nightly
 def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machines: list[Rig]) -> None:
-    done: list[str] = []
+    events: list[str] = []
 
     def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
-        if not done and in_tank(participant):
+        if not events and in_tank(participant):
             participant.windowHandle().close()  # as Alt+F4 and the cross in its frame do
-            done.append("closed")
+            events.append("closed")
             return True
-        if done == ["closed"] and isinstance(participant.page, PausePage):
-            done.append(journal_events.Paused())
+        if events == ["closed"] and isinstance(participant.page, PausePage):
+            events.append(journal_events.Paused())
             operator.ask("resume")
             return True
         return False
 
     code, lines = hold(tmp_path, watch)
-    assert (code, done) == (0, ["closed", "paused"])
+    assert (code, events) == (0, ["closed", "paused"])
     assert lines[-1]["status"] == "completed"
 
 
@@ -113,22 +113,22 @@ def test_a_request_to_terminate_in_a_trial_interrupts_it_and_can_be_resumed(
 def test_a_device_that_vanishes_is_a_calm_page_a_reason_and_a_broken_session(
     tmp_path: Path, machines: list[Rig]
 ) -> None:
-    seen: list[tuple[str, str]] = []
+    texts: list[tuple[str, str]] = []
 
     def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
-        if in_tank(participant) and not seen:
+        if in_tank(participant) and not texts:
             machines[0].device.unplug()  # type: ignore[attr-defined]
             return True
         page = participant.page
-        if type(page).__name__ == "TroublePage" and not seen:
-            seen.append((page.paragraph, operator.banner.what.text()))
+        if type(page).__name__ == "TroublePage" and not texts:
+            texts.append((page.paragraph, operator.banner.what.text()))
             operator.ask("end", "aborted", "cable")
             return True
         return False
 
     said, lines = hold(tmp_path, watch)
     assert "stopped responding" in str(said)
-    calm, reason = seen[0]
+    calm, reason = texts[0]
     assert "stopped responding" in reason
     assert "device" not in calm
     assert lines[-1]["status"] == "broken"

@@ -1,4 +1,4 @@
-"""What a page draws: its pixels, and its words with their places, recorded while it paints itself."""
+"""The drawing of a page: its pixels, and its texts with their positions, recorded while it is painted."""
 
 import sys
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ class Drawn:
 
 
 class Recorder(QPainter):
-    """A painter that keeps which words it draws and where."""
+    """A painter that records the texts that it draws and their positions."""
 
     def __init__(self, widget: QWidget, kept: list[Drawn]) -> None:
         super().__init__(widget)
@@ -46,7 +46,7 @@ class Recorder(QPainter):
 
 @contextmanager
 def recorded() -> Iterator[list[Drawn]]:
-    """Keep what is drawn meanwhile."""
+    """Record the texts that are drawn meanwhile."""
     kept: list[Drawn] = []
     painting = [
         module
@@ -60,16 +60,16 @@ def recorded() -> Iterator[list[Drawn]]:
 
 
 def drawn_by(window: QWidget) -> list[Drawn]:
-    """Return all words on a window: those that are painted, and those of its labels."""
+    """Return all texts of a window: painted ones, and those of labels."""
     QApplication.processEvents()
     with recorded() as kept:
         window.grab()
-    found = list(kept)
+    texts = list(kept)
     for label in window.findChildren(QLabel):
         if label.isVisible() and label.text():
             place = QRectF(label.rect()).translated(QPointF(label.mapTo(window, label.rect().topLeft())))
-            found.append(Drawn(label, label.text(), place, place))
-    return found
+            texts.append(Drawn(label, label.text(), place, place))
+    return texts
 
 
 def pixels(image: QImage) -> np.ndarray:
@@ -79,5 +79,5 @@ def pixels(image: QImage) -> np.ndarray:
     return flat[:, : image.width(), :3].copy()
 
 
-def shown(widget: QWidget) -> np.ndarray:
+def grabbed_pixels(widget: QWidget) -> np.ndarray:
     return pixels(widget.grab().toImage())

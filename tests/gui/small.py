@@ -44,7 +44,7 @@ def form(*items: ItemView, **changed: Any) -> QuestionnairePage:
 
 
 class ManualClock:
-    """Seconds that pass when told, a little with every look."""
+    """A manual clock that also advances a little with every reading."""
 
     def __init__(self) -> None:
         self.now_s, self.step_s = 100.0, 0.001
@@ -90,7 +90,7 @@ def reach(**changed: Any) -> Reach:
         "radius_mm": 6,
         "dwell_s": 0.5,
         "count": 12,
-        "instruction": "Hold the ball in the lit ring until it closes",
+        "instruction": "Hold the ball in the highlighted ring until it closes",
     }
     return Reach(**(fields | changed))
 

@@ -1,4 +1,4 @@
-"""Windows in states that no click leads to: each is a row of what is shown in turn, for the transcripts."""
+"""Windows in states that no click leads to, with the actions that show each state for the transcripts."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -33,15 +33,15 @@ from tests.gui.operator.states import DISK, RUNNING, STRIP, operator, strip
 from tests.gui.results.sample import STUDY
 from tests.gui.results.states import NOW, PAGE, PEOPLE, RESULTS, WRITING, page, writing
 from tests.gui.transcript import Actions, clicked, in_turn, part_of, typed
-from tests.gui.windows import FOUND, WELL, checked, preflight, results, show_settings, shown
+from tests.gui.windows import FOUND, WELL, checked, preflight, results, show_settings, show_window
 
 
 class Examined:
-    """An examination that says what it is given."""
+    """An examination whose answers a test sets."""
 
     def __init__(self, name: str, options: Any) -> None:
         self.name, self.options = name, options
-        self.told: list[Any] = []
+        self.pending_answers: list[Any] = []
         self.closed = False
 
     @property
@@ -49,8 +49,8 @@ class Examined:
         return self.closed
 
     def answers(self) -> list[tuple[int, Any]]:
-        told, self.told = self.told, []
-        return [(1, one) for one in told]
+        messages, self.pending_answers = self.pending_answers, []
+        return [(1, message) for message in messages]
 
     def close(self) -> None:
         self.closed = True
@@ -72,38 +72,38 @@ def diagnosis(qtbot: Any) -> DiagnosisDialog:
         begun.append(Examined(name, options))
         return begun[-1]
 
-    made: Any = DiagnosisDialog(None, LIGHT, "falcon", note="The force is off.", begin=begin)
-    made.begun = begun
-    made.findChild(QTimer).setInterval(10**6)
-    return shown(qtbot, made, (760, 600))  # type: ignore[no-any-return]
+    window: Any = DiagnosisDialog(None, LIGHT, "falcon", note="The force is off.", begin=begin)
+    window.begun = begun
+    window.findChild(QTimer).setInterval(10**6)
+    return show_window(qtbot, window, (760, 600))  # type: ignore[no-any-return]
 
 
-def says(*told: Any) -> Callable[[Any], None]:
-    def act(made: Any) -> None:
-        made.begun[-1].told = list(told)
-        made.findChild(QTimer).timeout.emit()
+def report_messages(*messages: Any) -> Callable[[Any], None]:
+    def act(window: Any) -> None:
+        window.begun[-1].pending_answers = list(messages)
+        window.findChild(QTimer).timeout.emit()
 
     return act
 
 
 DIAGNOSIS: Actions = {
-    "a step": says("Pull the grip out.", "Push it in."),
-    "found": says(REFUSED),
-    "copied": lambda made: made.copy.click(),
-    "asks where": lambda made: made.support.click(),
-    "not saved": lambda made: made.save_support(Path("missing") / "help.zip"),
-    "saved": lambda made: made.save_support(Path("help.zip")),
-    "again": lambda made: made.again.click(),
-    "well": says(FALCON_WELL),
-    "refused": lambda made: (made.again.click(), says(Refused("'mouse' is none"))(made)),
-    "closed": lambda made: made.close_button.click(),
+    "a step": report_messages("Pull the grip out.", "Push it in."),
+    "found": report_messages(REFUSED),
+    "copied": lambda window: window.copy.click(),
+    "asks where": lambda window: window.support.click(),
+    "not saved": lambda window: window.save_support(Path("missing") / "help.zip"),
+    "saved": lambda window: window.save_support(Path("help.zip")),
+    "again": lambda window: window.again.click(),
+    "well": report_messages(FALCON_WELL),
+    "refused": lambda window: (window.again.click(), report_messages(Refused("'mouse' is none"))(window)),
+    "closed": lambda window: window.close_button.click(),
 }
 
 
-def of_devices(*found: Backend, preferred: str = "falcon") -> Callable[[Any], None]:
+def of_devices(*backends: Backend, preferred: str = "falcon") -> Callable[[Any], None]:
     def act(place: Any) -> None:
         place.show_settings(MachineSettings(device=preferred))
-        place.show_devices(devices_shown([*FOUND, *found]))
+        place.show_devices(devices_shown([*FOUND, *backends]))
 
     return act
 
@@ -172,26 +172,26 @@ SETTINGS: Actions = {
 
 def patch_page(qtbot: Any) -> QWidget:
     clock = SimpleNamespace(now=0)
-    made: Any = windows.display_test(qtbot, now_ns=lambda: clock.now)
-    made.clock = clock
-    return made  # type: ignore[no-any-return]
+    window: Any = windows.display_test(qtbot, now_ns=lambda: clock.now)
+    window.clock = clock
+    return window  # type: ignore[no-any-return]
 
 
-def frames(made: Any) -> None:
+def frames(window: Any) -> None:
     """Paint twenty frames, one of them late."""
     for number in range(20):
-        made.clock.now += 16_666_667 * (1 + (number == 9))
-        made.draw_frame()
-        made.repaint()
-    made.show_figures()
+        window.clock.now += 16_666_667 * (1 + (number == 9))
+        window.draw_frame()
+        window.repaint()
+    window.show_figures()
 
 
 DISPLAY_TEST: Actions = {
     "measured": frames,
     "interval refused": typed("interval.control", "9"),
     "interval taken": typed("interval.control", "200"),
-    "toggled": lambda made: (setattr(made.clock, "now", 10**9), made.draw_frame()),
-    "small": lambda made: made.resize(1024, 640),
+    "toggled": lambda window: (setattr(window.clock, "now", 10**9), window.draw_frame()),
+    "small": lambda window: window.resize(1024, 640),
 }
 
 
@@ -199,16 +199,16 @@ def computer(qtbot: Any) -> QWidget:
     below = QWidget()
     qtbot.addWidget(below)
     check = ComputerCheck(below, LIGHT, Path(), QApplication.screens()[0])
-    made: Any = check.window
-    made.below, made.check = below, check
-    made.asked.disconnect()  # it would measure
-    made.finished.disconnect()
-    return shown(qtbot, made, (860, 620))  # type: ignore[no-any-return]
+    window: Any = check.window
+    window.below, window.check = below, check
+    window.asked.disconnect()  # it would measure
+    window.finished.disconnect()
+    return show_window(qtbot, window, (860, 620))  # type: ignore[no-any-return]
 
 
-def of_computer(found: list[Backend], cache: Path | None, compiled: int, **facts: Any) -> Callable[[Any], None]:
-    given = computer_checks(replace(WELL, **facts), load("demo"), found, cache=cache, compiled=compiled)
-    return lambda window: window.show_checks(given)
+def of_computer(backends: list[Backend], cache: Path | None, compiled: int, **facts: Any) -> Callable[[Any], None]:
+    checks = computer_checks(replace(WELL, **facts), load("demo"), backends, cache=cache, compiled=compiled)
+    return lambda window: window.show_checks(checks)
 
 
 COMPUTER: Actions = {
@@ -237,16 +237,16 @@ PREFLIGHT: Actions = {
 
 def opening(qtbot: Any) -> OpeningWindow:
     clock = SimpleNamespace(now=0.0)
-    made: Any = OpeningWindow("Preparing demo", "Participant P001", now_s=lambda: clock.now)
-    made.clock = clock
-    return shown(qtbot, made, (560, 260))  # type: ignore[no-any-return]
+    window: Any = OpeningWindow("Preparing demo", "Participant P001", now_s=lambda: clock.now)
+    window.clock = clock
+    return show_window(qtbot, window, (560, 260))  # type: ignore[no-any-return]
 
 
 OPENING: Actions = {
-    "long": lambda made: (setattr(made.clock, "now", 72.0), made.findChild(QTimer).timeout.emit()),
-    "compiled": lambda made: made.show_compiled(0.4),
-    "the device asks": lambda made: (made.show_line("Pull the grip out."), made.findChild(QTimer).timeout.emit()),
-    "ready": lambda made: made.finish(),
+    "long": lambda window: (setattr(window.clock, "now", 72.0), window.findChild(QTimer).timeout.emit()),
+    "compiled": lambda window: window.show_compiled(0.4),
+    "the device asks": lambda window: (window.show_line("Pull the grip out."), window.findChild(QTimer).timeout.emit()),
+    "ready": lambda window: window.finish(),
 }
 
 
@@ -324,10 +324,10 @@ NEW_SESSION: Actions = {
     "begun by Enter": lambda dialog: QTest.keyClick(dialog.editors["participant"].control, Qt.Key.Key_Return),
 }
 HELP: Actions = {
-    "search": lambda place: QTest.keyClicks(place.words, "photodiode"),
-    "a result": lambda place: QTest.keyClick(place.words, Qt.Key.Key_Down),
-    "nothing found": lambda place: QTest.keyClicks(place.words, " zebra"),
-    "narrow": lambda place: (place.words.clear(), place.resize(928, 640)),
+    "search": lambda place: QTest.keyClicks(place.search_field, "photodiode"),
+    "a result": lambda place: QTest.keyClick(place.search_field, Qt.Key.Key_Down),
+    "nothing found": lambda place: QTest.keyClicks(place.search_field, " zebra"),
+    "narrow": lambda place: (place.search_field.clear(), place.resize(928, 640)),
     "back": clicked("back"),
     "no such page": lambda place: place.reader.anchorClicked.emit(QUrl("no-such-page.md")),
     "dark": lambda place: apply_theme(place, DARK),

@@ -1,4 +1,4 @@
-"""Each control and shortcut of every window: its name, its tip, and what it does when it is used.
+"""Each control and shortcut of every window: its name, its tip, and its effect.
 
 ``actions.txt`` has a line for each: ``name | tip | signals, opened dialogs, and the first text that appears``
 (the designer's texts follow later). It is changed by hand: no option regenerates it.
@@ -50,17 +50,17 @@ def test_every_window_is_in_the_table() -> None:
 
 
 @pytest.mark.parametrize("window", TABLE)
-def test_each_control_has_its_tip_and_does_what_it_says(
+def test_each_control_has_its_tip_and_effect(
     qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, window: str
 ) -> None:
     two_screens(monkeypatch)
     monkeypatch.chdir(tmp_path)
     if window.startswith("designer, "):
-        shown = _designer(tmp_path, *window.removeprefix("designer, ").split("."))
+        window_shown = _designer(tmp_path, *window.removeprefix("designer, ").split("."))
     else:
-        shown = WINDOWS[window][0](qtbot, tmp_path) if window in WINDOWS else STATES[window][0](qtbot)
-    settle(shown)
-    rows = [" | ".join(row).rstrip(" |") for row in _used(shown)]
+        window_shown = WINDOWS[window][0](qtbot, tmp_path) if window in WINDOWS else STATES[window][0](qtbot)
+    settle(window_shown)
+    rows = [" | ".join(row).rstrip(" |") for row in _used(window_shown)]
     for left in QApplication.topLevelWidgets():
         left.hide()
     assert rows == TABLE[window]
@@ -76,11 +76,11 @@ def _designer(folder: Path, *path: str) -> QWidget:
 
 def _used(window: QWidget) -> Iterator[tuple[str, str, str]]:
     """Yield name, tip and effect of each control, then of each shortcut."""
-    heard, others = listen(window), {one for one in QApplication.topLevelWidgets() if one.isVisible()}
-    done: set[str] = set()
-    while controls := [one for one in window.findChildren(QWidget) if _is_new(one, done)]:
+    heard, others = listen(window), {widget for widget in QApplication.topLevelWidgets() if widget.isVisible()}
+    names_done: set[str] = set()
+    while controls := [widget for widget in window.findChildren(QWidget) if _is_new(widget, names_done)]:
         control = min(controls, key=_order)
-        done.add(name_of(control))
+        names_done.add(name_of(control))
         tip = control.toolTip().replace("\n", " ")
         yield name_of(control), tip, _effect(window, heard, others, partial(use, control))
     for shortcut in filter(isValid, window.findChildren(QShortcut)):
@@ -94,9 +94,9 @@ def _order(control: QWidget) -> int:
     return 2 if LAST.search(name_of(control)) else int(isinstance(control, QLineEdit | QPlainTextEdit))
 
 
-def _is_new(part: QWidget, done: set[str]) -> bool:
+def _is_new(part: QWidget, names_done: set[str]) -> bool:
     left_out = not isinstance(part, CONTROLS) or REPEATED.search(name_of(part)) or UNUSED.search(name_of(part))
-    return not left_out and is_usable(part) and name_of(part) not in {"", *done}
+    return not left_out and is_usable(part) and name_of(part) not in {"", *names_done}
 
 
 def _texts(window: QWidget) -> list[str]:
@@ -105,13 +105,13 @@ def _texts(window: QWidget) -> list[str]:
 
 def _effect(window: QWidget, heard: list[str], others: set[QWidget], act: Callable[[], object]) -> str:
     """Return the signals of an act, the dialogs that it opened, and the first text that it showed at once."""
-    before, opened, was_visible = _texts(window), list[str](), window.isVisible()
+    before, dialogs, was_visible = _texts(window), list[str](), window.isVisible()
     heard.clear()
 
     def close_dialogs() -> None:
         for other in QApplication.topLevelWidgets():
             if other.isVisible() and other not in others:
-                opened.append(f"opens {other.windowTitle()}")
+                dialogs.append(f"opens {other.windowTitle()}")
                 other.close()
 
     closing = QTimer(interval=50)
@@ -125,4 +125,4 @@ def _effect(window: QWidget, heard: list[str], others: set[QWidget], act: Callab
     for pattern, short in SHORT:
         heard[:] = [re.sub(pattern, short, signal) for signal in heard if not LEFT.search(signal)]
     closes = ["closes"] * (was_visible and not window.isVisible())
-    return "; ".join([*dict.fromkeys(heard), *opened, *new, *closes]).replace("\n", " ")
+    return "; ".join([*dict.fromkeys(heard), *dialogs, *new, *closes]).replace("\n", " ")

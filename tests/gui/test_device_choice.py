@@ -1,4 +1,4 @@
-"""What choosing a device asks of the windows, and the note while a session is being made ready."""
+"""The effects of choosing a device, and the window shown while a session is prepared."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -38,11 +38,11 @@ CHOSEN = NewSession(
         ("falcon-emulated", "demo-falcon-emulated"),
     ],
 )
-def test_what_nobody_felt_is_kept_apart(tmp_path, device, folder):
+def test_simulated_sessions_have_a_separate_folder(tmp_path, device, folder):
     assert study_results(tmp_path, "demo", device) == tmp_path / folder
 
 
-def test_firmware_is_for_falcons_alone(tmp_path):
+def test_firmware_is_offered_only_for_falcons(tmp_path):
     study = load("demo")
     chosen = replace(CHOSEN, results=tmp_path, device_options={"firmware": tmp_path / "file.bin"})
     with pytest.raises(DeviceError, match="device 'mouse' does not use firmware; only these do: Novint Falcon,"):
@@ -54,29 +54,29 @@ def test_firmware_is_for_falcons_alone(tmp_path):
 
 @pytest.fixture
 def opening(qtbot: Any) -> OpeningWindow:
-    made = OpeningWindow("A first look", "Participant P001")
-    qtbot.addWidget(made)
-    made.show()
-    qtbot.waitExposed(made)
-    return made
+    window = OpeningWindow("A first look", "Participant P001")
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitExposed(window)
+    return window
 
 
-def test_the_note_says_what_takes_long_unless_the_device_asks_for_something(qtbot: Any) -> None:
+def test_the_note_explains_long_compilation_unless_the_device_gives_an_instruction(qtbot: Any) -> None:
     now_s = [100.0]
-    made = OpeningWindow("A first look", "Participant P001", now_s=lambda: now_s[0])
-    qtbot.addWidget(made)
-    bar, tick = made.findChild(QProgressBar), made.findChild(QTimer).timeout.emit
-    texts = [part.text() for part in made.findChildren(QLabel)]
-    assert {"A first look", "Participant P001", "Preparing the device and the force model …"} <= {*texts}
+    window = OpeningWindow("A first look", "Participant P001", now_s=lambda: now_s[0])
+    qtbot.addWidget(window)
+    bar, tick = window.findChild(QProgressBar), window.findChild(QTimer).timeout.emit
+    texts = [part.text() for part in window.findChildren(QLabel)]
+    assert {"A first look", "Participant P001", "Preparing the device and the force model…"} <= {*texts}
     for seconds, elapsed, is_long in ((3.9, "0:03", False), (4.0, "0:04", False), (72.5, "1:12", True)):
         now_s[0] = 100.0 + seconds
         tick()
-        assert (made.elapsed.text(), made.step.text().startswith("The force model")) == (elapsed, is_long)
+        assert (window.elapsed.text(), window.step.text().startswith("The force model")) == (elapsed, is_long)
     assert bar.maximum() == 0
-    made.show_line("Pull the grip out.")
+    window.show_line("Pull the grip out.")
     tick()
-    made.show_compiled(0.6)
-    assert (made.step.text(), bar.maximum(), bar.value()) == ("Pull the grip out.", 100, 60)
+    window.show_compiled(0.6)
+    assert (window.step.text(), bar.maximum(), bar.value()) == ("Pull the grip out.", 100, 60)
     other = OpeningWindow("A first look", "Participant P001")
     qtbot.addWidget(other)
     other.show()
@@ -91,9 +91,7 @@ def test_the_note_says_what_takes_long_unless_the_device_asks_for_something(qtbo
 
 
 @pytest.mark.parametrize("ready", [False, True])
-def test_escape_goes_back_whichever_part_has_the_keyboard_and_what_is_ready_is_not_cancelled(
-    opening: OpeningWindow, ready: bool
-) -> None:
+def test_escape_closes_the_window_and_cancels_only_an_unfinished_opening(opening: OpeningWindow, ready: bool) -> None:
     cancelled: list[bool] = []
     opening.cancelled.connect(lambda: cancelled.append(True))
     if ready:

@@ -23,7 +23,7 @@ def nothing_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("name", WINDOWS)
-def test_nothing_is_cut_everything_has_a_name_and_no_button_is_dead(qtbot: Any, tmp_path: Any, name: str) -> None:
+def test_every_window_fits_names_its_widgets_and_connects_its_buttons(qtbot: Any, tmp_path: Any, name: str) -> None:
     make, sizes = WINDOWS[name]
     window = make(qtbot, tmp_path)
     for size in sizes:

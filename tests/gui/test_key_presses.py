@@ -1,4 +1,4 @@
-"""Held keys, clicks that are carried over and digit rows, in every window that a person types in."""
+"""Held keys, carried-over clicks and digit keys in every window with typing."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -201,16 +201,16 @@ def test_a_hold_that_the_program_was_too_busy_to_time_counts_by_its_time_stamps(
     window.show()
     handle_in_focus(window, qtbot)
     escape = EscapeKey(window, anywhere=True)
-    told: list[str] = []
-    escape.held.connect(lambda: told.append("held"))
-    escape.tapped.connect(lambda: told.append("tapped"))
+    signals: list[str] = []
+    escape.held.connect(lambda: signals.append("held"))
+    escape.tapped.connect(lambda: signals.append("tapped"))
     for lasts_ms, expected in ((HOLD_MS - 1, "tapped"), (HOLD_MS, "held")):
         keyboard.press(KEY.Key_Escape)
         keyboard.time_ms += lasts_ms
         keyboard.release(KEY.Key_Escape)
-        qtbot.waitUntil(lambda expected=expected: expected in told)
+        qtbot.waitUntil(lambda expected=expected: expected in signals)
         keyboard.time_ms += 300
-    assert told == ["tapped", "held"]
+    assert signals == ["tapped", "held"]
 
 
 def test_a_release_that_no_window_received_leaves_no_key_down(qtbot: Any, participant: Any, keyboard: Keyboard) -> None:

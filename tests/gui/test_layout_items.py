@@ -17,12 +17,16 @@ READ = re.compile(r"\.(itemAt|takeAt|itemAtPosition|replaceWidget|addLayout|inse
 
 def wrapped() -> list[QLayoutItem]:
     """Return the wrappers of items; those of layouts live as long as these."""
-    return [one for one in shiboken6.getAllValidWrappers() if type(one).__name__ in {"QWidgetItem", "QSpacerItem"}]
+    return [
+        wrapper
+        for wrapper in shiboken6.getAllValidWrappers()
+        if type(wrapper).__name__ in {"QWidgetItem", "QSpacerItem"}
+    ]
 
 
 def test_only_the_functions_of_boxes_make_wrappers_of_items() -> None:
-    found = {path.name for path in (ROOT / "study_app" / "gui").rglob("*.py") if READ.search(path.read_text("utf-8"))}
-    assert found == {"boxes.py"}
+    readers = {path.name for path in (ROOT / "study_app" / "gui").rglob("*.py") if READ.search(path.read_text("utf-8"))}
+    assert readers == {"boxes.py"}
 
 
 @pytest.mark.usefixtures("qapp")

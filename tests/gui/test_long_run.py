@@ -1,4 +1,4 @@
-"""Half an hour of servo in virtual time, in every fault there is, while both windows of a session paint."""
+"""Half an hour of servo in virtual time with every fault, while both windows of a session paint."""
 
 import threading
 
@@ -21,31 +21,31 @@ pytestmark = [pytest.mark.slow, needs_servo]
 @pytest.mark.usefixtures("qapp")
 def test_half_an_hour_under_load_drops_nothing_drifts_by_nothing_and_takes_no_memory() -> None:
     windows = WindowsThread("gui")
-    found = windows.during(lambda: soak_servo(load_scenes("rek2024"), HALF_AN_HOUR, virtual=True))
-    assert found.findings == ()
-    assert found.ticks == found.planned == 1_800_000
-    assert found.dropped == 0
-    assert found.counts.missing == 0
-    assert found.counts.drift_ns == 0
-    assert found.growth_bytes <= FLAT_BYTES  # what other tests left may go meanwhile
+    result = windows.during(lambda: soak_servo(load_scenes("rek2024"), HALF_AN_HOUR, virtual=True))
+    assert result.findings == ()
+    assert result.ticks == result.planned == 1_800_000
+    assert result.dropped == 0
+    assert result.counts.missing == 0
+    assert result.counts.drift_ns == 0
+    assert result.growth_bytes <= FLAT_BYTES  # what other tests left may go meanwhile
     assert windows.frames > 20
 
 
 @pytest.mark.usefixtures("qapp")
 def test_windows_are_open_while_work_is_done_and_gone_after_it() -> None:
     windows = WindowsThread("gui")
-    seen: list[int] = []
+    frame_counts: list[int] = []
 
     def work() -> str:
         wait = threading.Event()
         while windows.frames < 3:
             wait.wait(0.005)
-        seen.append(windows.frames)
+        frame_counts.append(windows.frames)
         return "done"
 
     assert windows.during(work) == "done"
-    assert seen[0] >= 3
-    assert not [one for one in QApplication.topLevelWidgets() if one.isVisible()]
+    assert frame_counts[0] >= 3
+    assert not [widget for widget in QApplication.topLevelWidgets() if widget.isVisible()]
 
 
 @pytest.mark.usefixtures("qapp")
@@ -60,7 +60,7 @@ def test_a_timer_of_qt_fires_as_often_as_asked_in_the_windows_thread() -> None:
 
 
 @pytest.mark.usefixtures("qapp")
-def test_a_tick_that_fails_in_the_timer_is_told_to_who_asked() -> None:
+def test_a_failed_tick_in_the_timer_raises_in_the_caller() -> None:
     windows = WindowsThread("none")
 
     def fail() -> None:

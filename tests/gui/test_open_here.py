@@ -29,7 +29,7 @@ def notice_of(window: QWidget) -> str:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has xdg-open")
 @pytest.mark.parametrize("code", [0, 3])
-def test_a_program_that_fails_is_told_with_the_path(
+def test_a_failing_program_is_reported_with_the_path(
     window: QWidget, qtbot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
 ) -> None:
     program, report = tmp_path / "xdg-open", tmp_path / "report.html"
@@ -43,7 +43,7 @@ def test_a_program_that_fails_is_told_with_the_path(
     assert (str(report.resolve()) in notice_of(window)) == (code != 0)
 
 
-def test_a_system_without_a_program_is_told_with_the_path(
+def test_a_missing_program_is_reported_with_the_path(
     window: QWidget, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))

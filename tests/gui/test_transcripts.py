@@ -1,4 +1,4 @@
-"""Every window, compared with a reviewed text: what it tells in each state, and what each control does."""
+"""Every window, compared with a reviewed text: its spoken texts in each state, and the effect of each control."""
 
 import time
 from collections.abc import Iterator
@@ -50,7 +50,7 @@ def alike_every_time(qapp: QApplication, monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 
 def works(window: QWidget) -> bool:
-    """Whether a job goes on, or a figure is not drawn yet."""
+    """Return whether a job is running or a figure is not drawn yet."""
     parts = (part for part in window.findChildren(QWidget) if part.isVisible())
     return any(job.busy for job in window.findChildren(Background)) or not all(
         getattr(part, "is_settled", True) for part in parts
@@ -65,7 +65,7 @@ def at_rest(window: QWidget) -> None:
     settle(window)
 
 
-def opened(qtbot: Any, name: str) -> Any:
+def open_window(qtbot: Any, name: str) -> Any:
     make, sizes = WINDOWS[name]
     window = make(qtbot, Path())
     settle(window, sizes[-1])
@@ -73,15 +73,15 @@ def opened(qtbot: Any, name: str) -> Any:
 
 
 @pytest.mark.parametrize("name", [name for name in WINDOWS if name not in STATES])
-def test_what_a_window_tells(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
-    window = opened(qtbot, name)
+def test_spoken_texts_of_each_window(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
+    window = open_window(qtbot, name)
     compare(f"{name}, shown", list(states(window, {}, lambda: at_rest(window))), pytestconfig)
     window.window().close()
     window.window().hide()
 
 
-@pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] * (one in SLOW)) for one in STATES])
-def test_what_each_state_tells(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in STATES])
+def test_spoken_texts_of_each_state(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
     make, actions = STATES[name]
     window = make(qtbot)
     at_rest(window)
@@ -92,10 +92,10 @@ def test_what_each_state_tells(qtbot: Any, name: str, pytestconfig: pytest.Confi
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", dict.fromkeys((*WINDOWS, *STATES)))
-def test_what_each_control_does(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
-    window = opened(qtbot, name) if name in WINDOWS else STATES[name][0](qtbot)
+def test_effects_of_each_control(qtbot: Any, name: str, pytestconfig: pytest.Config) -> None:
+    window = open_window(qtbot, name) if name in WINDOWS else STATES[name][0](qtbot)
     at_rest(window)
-    place = next((one for one in window.findChildren(Place) if one.isVisible()), window)
+    place = next((candidate for candidate in window.findChildren(Place) if candidate.isVisible()), window)
     compare(f"{name}, used", list(steps(place, lambda: at_rest(window))), pytestconfig)
     window.window().close()
     window.window().hide()

@@ -1,4 +1,4 @@
-"""A window as text, for golden files: what it tells a screen reader in each state, and what each control does.
+"""A window as text for golden files: its screen-reader texts in each state, and the effect of each control.
 
 ``python -m pytest tests/gui/test_transcripts.py --regenerate`` writes the files anew: read the difference.
 """
@@ -55,7 +55,7 @@ ALIKE = 4
 """Most controls of one kind in parts of one kind, such as cards of studies, that are used."""
 
 
-def told(window: QWidget) -> list[str]:
+def widget_lines(window: QWidget) -> list[str]:
     """Return a line for each widget that has a name, a tip or a value: role, name, description, value and states."""
     lines = []
     for part in [window, *window.findChildren(QWidget)]:
@@ -70,20 +70,20 @@ def told(window: QWidget) -> list[str]:
         state = interface.state()
         on = [name for name in STATES if getattr(state, name)]
         if any(words):
-            lines.append(" ".join([interface.role().name, *on, _told_once(words)]))
+            lines.append(" ".join([interface.role().name, *on, _joined_once(words)]))
         if isinstance(part, QAbstractItemView) and part.model() is not None:
             lines += _cells(part.model())
     return lines
 
 
-def _told_once(words: list[str]) -> str:
-    """Return texts beside each other, "=" in place of one that stands before."""
-    shown = ["=" if word and word in words[:at] else word for at, word in enumerate(words)]
-    return " | ".join(shown).replace("\n", " / ").rstrip(" |")
+def _joined_once(words: list[str]) -> str:
+    """Join texts in one line, with "=" in place of a repeated one."""
+    texts = ["=" if word and word in words[:at] else word for at, word in enumerate(words)]
+    return " | ".join(texts).replace("\n", " / ").rstrip(" |")
 
 
 def _cells(model: QAbstractItemModel) -> Iterator[str]:
-    """Yield a line for each row of a table or list: of its cells what is shown, told and in the tip."""
+    """Yield a line for each row of a table or list: shown text, spoken text and tip of its cells."""
     roles = (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole, Qt.ItemDataRole.ToolTipRole)
     across = range(1 if isinstance(model, QAbstractListModel) else model.columnCount())
     yield "columns " + " | ".join(str(model.headerData(at, Qt.Orientation.Horizontal)) for at in across)
@@ -93,16 +93,16 @@ def _cells(model: QAbstractItemModel) -> Iterator[str]:
 
 
 def spoken(window: QWidget) -> list[str]:
-    """Return what a window tells once its animations have ended, without texts that another of its lines has."""
+    """Return the spoken lines of a window after its animations, without texts that other lines repeat."""
     for animation in window.findChildren(QAbstractAnimation):
         animation.setCurrentTime(animation.totalDuration())
-    lines = [golden.masked(line.replace(DISABLED_TEXT, TEXT))[:LONGEST] for line in told(window)]
+    lines = [golden.masked(line.replace(DISABLED_TEXT, TEXT))[:LONGEST] for line in widget_lines(window)]
     others = "\n".join(line for line in lines if not line.startswith(TEXT))
     return [line for line in lines if not (line.startswith(TEXT) and line.removeprefix(TEXT) in others)]
 
 
 def comes_and_goes(before: list[str], after: list[str]) -> Iterator[str]:
-    """Yield lines that come, and of lines that go and are not replaced the first and how many others."""
+    """Yield new lines, and of removed lines without a replacement the first and the number of others."""
     for how, start, end, first, last in SequenceMatcher(None, before, after, autojunk=False).get_opcodes():
         if how == "delete":
             yield f"- {before[start][:60]}" + (f" … {end - start - 1} more" if end - start > 1 else "")
@@ -111,7 +111,7 @@ def comes_and_goes(before: list[str], after: list[str]) -> Iterator[str]:
 
 
 def listen(window: QWidget) -> list[str]:
-    """Return a list that gets each signal that a window's, or its places', own classes declare, with its arguments."""
+    """Return a list that records each signal, with its arguments, of a window's own classes and of its pages."""
     heard: list[str] = []
     for part in [window, *window.findChildren(Place)]:
         meta = part.metaObject()
@@ -164,31 +164,31 @@ def use(control: QWidget) -> None:
             QTest.keyClick(control, Qt.Key.Key_Return)
 
 
-def _close_dialogs(seen: list[str], kept: set[QWidget]) -> None:
+def _close_dialogs(dialog_lines: list[str], known_windows: set[QWidget]) -> None:
     for other in QApplication.topLevelWidgets():
-        if other.isVisible() and other not in kept:
-            seen.append(f"opened {type(other).__name__} {other.windowTitle()!r}")
+        if other.isVisible() and other not in known_windows:
+            dialog_lines.append(f"opened {type(other).__name__} {other.windowTitle()!r}")
             if not isinstance(other, QFileDialog):
                 other.activateWindow()
                 for _ in range(300):
                     if QApplication.focusWindow() is other.windowHandle():
                         break
                     QTest.qWait(1)
-                seen += spoken(other)
+                dialog_lines += spoken(other)
             other.close()
 
 
 class Recorder:
-    """What actions on a window do, each compared with what was there before it."""
+    """A recorder of the changes that each action makes in a window."""
 
     def __init__(self, window: QWidget, settled: Callable[[], None]) -> None:
         self.window, self.base, self._settled = window, window.window(), settled
-        self._kept = {one for one in QApplication.topLevelWidgets() if one.isVisible()}
+        self._kept = {widget for widget in QApplication.topLevelWidgets() if widget.isVisible()}
         self.heard = listen(window)
         self.lines = spoken(window)
 
     def _rest(self) -> None:
-        """Let the window come to rest; it is painted for the comparison alone."""
+        """Wait until the window has settled, and paint it for the comparison."""
         self.base.setUpdatesEnabled(False)
         self._settled()
         self.base.setUpdatesEnabled(True)
@@ -196,29 +196,29 @@ class Recorder:
     def record(self, name: str, act: Callable[[], object]) -> Iterator[str]:
         """Yield the signals, the dialogs and the lines that change while and after ``act`` runs."""
         self.heard.clear()
-        seen: list[str] = []
+        dialog_lines: list[str] = []
         blocked = QTimer(interval=200)
-        blocked.timeout.connect(lambda: _close_dialogs(seen, self._kept))
+        blocked.timeout.connect(lambda: _close_dialogs(dialog_lines, self._kept))
         blocked.start()
         act()
         blocked.stop()
         self._rest()
-        dialogs = len(seen)
-        _close_dialogs(seen, self._kept)
-        if len(seen) > dialogs:
+        dialogs = len(dialog_lines)
+        _close_dialogs(dialog_lines, self._kept)
+        if len(dialog_lines) > dialogs:
             self._rest()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
         if not self.base.isVisible():
-            seen.append("closed")
+            dialog_lines.append("closed")
         before, self.lines = self.lines, spoken(self.window)
         yield f"== {name}"
         yield from self.heard
-        yield from seen
+        yield from dialog_lines
         yield from comes_and_goes(before, self.lines)
 
 
 def steps(window: QWidget, settled: Callable[[], None]) -> Iterator[str]:
-    """Yield what each control and then each shortcut does, after the order in which the Tab key reaches controls."""
+    """Yield the effect of each control, in the order of the Tab key, and then of each shortcut."""
     recorder = Recorder(window, settled)
     used: set[str | QWidget] = set()
     yield "== Tab"
@@ -239,25 +239,25 @@ def steps(window: QWidget, settled: Callable[[], None]) -> Iterator[str]:
 
 
 def _unused(window: QWidget, used: set[str | QWidget]) -> Iterator[tuple[str, QWidget]]:
-    for one in window.findChildren(QWidget):
-        if isinstance(one, CONTROLS) and is_usable(one) and one not in used:
-            key = f"{type(one).__name__} {_name(one)!r}"
+    for widget in window.findChildren(QWidget):
+        if isinstance(widget, CONTROLS) and is_usable(widget) and widget not in used:
+            key = f"{type(widget).__name__} {_name(widget)!r}"
             if key not in used:
-                yield key, one
+                yield key, widget
 
 
-def states(window: Any, shown: Actions, settled: Callable[[], None]) -> Iterator[str]:
-    """Yield what a window tells, then what changes with each of the states it is brought into in turn."""
+def states(window: Any, actions: Actions, settled: Callable[[], None]) -> Iterator[str]:
+    """Yield the spoken lines of a window, then the lines that change with each action in turn."""
     recorder = Recorder(window, settled)
     yield from recorder.lines
-    for name, bring in shown.items():
+    for name, bring in actions.items():
         yield from recorder.record(name, lambda bring=bring: bring(window))
 
 
 def story(
     window: QWidget, acts: Iterable[tuple[str, Callable[[], object]]], settled: Callable[[], None]
 ) -> Iterator[str]:
-    """Yield what a window tells, then its signals and what it tells otherwise after each act in turn."""
+    """Yield the spoken lines of a window, then the signals and changed lines after each act in turn."""
     heard = listen(window)
     settled()
     before = spoken(window)
@@ -303,11 +303,11 @@ def typed(path: str, text: str) -> Callable[[Any], None]:
 
 
 def in_turn(*acts: Callable[[Any], object]) -> Callable[[Any], None]:
-    """Return an action of several, of which the last shows what is compared."""
+    """Return one action that performs several; the last one shows the compared state."""
 
     def act(window: Any) -> None:
-        for one in acts:
-            one(window)
+        for action in acts:
+            action(window)
 
     return act
 

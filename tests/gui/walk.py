@@ -1,4 +1,4 @@
-"""What must hold in every window: nothing is cut, everything has a name, no button is dead."""
+"""Checks of every window: nothing is cut off, everything has a name, every button works."""
 
 from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtGui import QAccessible
@@ -20,7 +20,7 @@ from study_app.gui.widgets.live_plots import Plot
 
 
 def settle(window: QWidget, size: QSize | tuple[int, int] | None = None) -> None:
-    """Give a window a size, and let layouts within layouts come to rest."""
+    """Resize a window, and wait until its nested layouts have settled."""
     if size is not None:
         window.resize(size if isinstance(size, QSize) else QSize(*size))
     for _ in range(4):
@@ -32,7 +32,7 @@ def place_of(widget: QWidget, window: QWidget) -> QRect:
 
 
 def scrolls(widget: QWidget, window: QWidget) -> bool:
-    """Whether a part of the window that may scroll holds ``widget``."""
+    """Return whether a scrollable part of the window contains ``widget``."""
     parent = widget.parentWidget()
     while parent is not None and parent is not window:
         if isinstance(parent, QAbstractScrollArea):
@@ -42,8 +42,8 @@ def scrolls(widget: QWidget, window: QWidget) -> bool:
 
 
 def cut(window: QWidget) -> list[str]:
-    """Return what cannot be read whole: words without room, or beyond the window or their parent."""
-    found = []
+    """Return the texts that are cut off, or beyond the window or their parent."""
+    problems = []
     for widget in window.findChildren(QWidget):
         if not widget.isVisible() or not isinstance(widget, QLabel | QPushButton | QLineEdit | QComboBox):
             continue
@@ -52,12 +52,12 @@ def cut(window: QWidget) -> list[str]:
         inside = window.rect().contains(place)
         across = place.left() >= 0 and place.right() <= window.width()
         if not (across if scrolls(widget, window) else inside):
-            found.append(f"{words}: outside")
+            problems.append(f"{words}: outside")
         parent = widget.parentWidget()
         if parent is not None and not parent.rect().adjusted(-1, -1, 1, 1).contains(widget.geometry()):
-            found.append(f"{words}: beyond its parent")
+            problems.append(f"{words}: beyond its parent")
         if isinstance(widget, QPushButton) and widget.text() and widget.width() < widget.minimumSizeHint().width():
-            found.append(f"{words}: {widget.width()} px for {widget.minimumSizeHint().width()}")
+            problems.append(f"{words}: {widget.width()} px for {widget.minimumSizeHint().width()}")
         if (
             isinstance(widget, QLabel)
             and not isinstance(widget, Elided)
@@ -65,52 +65,59 @@ def cut(window: QWidget) -> list[str]:
         ):
             metrics = widget.fontMetrics()
             if widget.wordWrap() and widget.height() < widget.heightForWidth(widget.width()):
-                found.append(f"{words}: too low")
+                problems.append(f"{words}: too low")
             lines = map(metrics.horizontalAdvance, widget.text().split("\n"))
             if not widget.wordWrap() and widget.width() < max(lines):
-                found.append(f"{words}: too narrow")
+                problems.append(f"{words}: too narrow")
             if widget.text() and widget.height() < metrics.height():
-                found.append(f"{words}: lower than a line")
-    return found
+                problems.append(f"{words}: lower than a line")
+    return problems
 
 
 def unnamed(window: QWidget) -> list[str]:
-    """Return what takes the keyboard, scrolls, or shows a curve, and has no name for those who cannot see it."""
-    found = [str(window)] if not QAccessible.queryAccessibleInterface(window) else []
+    """Return widgets that take the keyboard, scroll or show a curve but have no accessible name."""
+    problems = [str(window)] if not QAccessible.queryAccessibleInterface(window) else []
     for part in window.findChildren(QWidget):
         if not part.isVisible() or part.focusProxy() is not None:
             continue
-        told = QAccessible.queryAccessibleInterface(part)
-        name = told.text(QAccessible.Text.Name)
+        interface = QAccessible.queryAccessibleInterface(part)
+        name = interface.text(QAccessible.Text.Name)
         if (part.focusPolicy() & Qt.FocusPolicy.TabFocus or isinstance(part, QScrollBar)) and not name:
-            found.append(repr(part))
+            problems.append(repr(part))
         if isinstance(part, Plot):
-            sentence = told.text(QAccessible.Text.Description)
-            if told.role() != QAccessible.Role.Chart or not name or len(sentence.split()) <= 5 or sentence[-1] != ".":
-                found.append(f"{part!r}: {sentence}")
-    return found
+            sentence = interface.text(QAccessible.Text.Description)
+            if (
+                interface.role() != QAccessible.Role.Chart
+                or not name
+                or len(sentence.split()) <= 5
+                or sentence[-1] != "."
+            ):
+                problems.append(f"{part!r}: {sentence}")
+    return problems
 
 
 def misnamed(window: QWidget) -> list[str]:
-    """Return what is spoken otherwise than the visible label next to it says: voice control would not find it."""
-    found = []
-    for shown in window.findChildren(QLabel):
-        part = shown.buddy()
-        if part is not None and shown.isVisible() and shown.text() not in part.accessibleName():
-            found.append(f"{shown.text()!r}: {part.accessibleName()!r}")
-    return found
+    """Return widgets whose accessible name lacks their visible label: voice control would not find them."""
+    problems = []
+    for visible_label in window.findChildren(QLabel):
+        part = visible_label.buddy()
+        if part is not None and visible_label.isVisible() and visible_label.text() not in part.accessibleName():
+            problems.append(f"{visible_label.text()!r}: {part.accessibleName()!r}")
+    return problems
 
 
 def unreached(window: QWidget) -> list[str]:
-    """Return what takes the keyboard but is not in the chain of the Tab key."""
+    """Return widgets that take the keyboard but cannot be reached with Tab."""
     chain, part = set(), window.nextInFocusChain()
     while part is not window:
         chain.add(part)
         part = part.nextInFocusChain()
     takes = (
-        one for one in window.findChildren(QWidget) if one.isVisible() and one.focusPolicy() & Qt.FocusPolicy.TabFocus
+        widget
+        for widget in window.findChildren(QWidget)
+        if widget.isVisible() and widget.focusPolicy() & Qt.FocusPolicy.TabFocus
     )
-    return [repr(one) for one in takes if one not in chain]
+    return [repr(widget) for widget in takes if widget not in chain]
 
 
 def upright(window: QWidget) -> list[str]:
@@ -121,13 +128,13 @@ def upright(window: QWidget) -> list[str]:
 
 
 def dead(window: QWidget) -> list[str]:
-    """Return the buttons that do nothing, and those too small to be hit."""
+    """Return the buttons that do nothing or are smaller than 24 pixels."""
     signals = ("2clicked(bool)", "2clicked()", "2pressed()")
-    found = []
-    for one in window.findChildren(QAbstractButton):
-        words = one.text() or one.accessibleName()
-        if isinstance(one, QPushButton) and not one.isCheckable() and not any(map(one.receivers, signals)):
-            found.append(f"dead: {words}")
-        if one.isVisible() and one.isEnabled() and min(one.width(), one.height()) < 24:
-            found.append(f"small: {words}")
-    return found
+    problems = []
+    for button in window.findChildren(QAbstractButton):
+        words = button.text() or button.accessibleName()
+        if isinstance(button, QPushButton) and not button.isCheckable() and not any(map(button.receivers, signals)):
+            problems.append(f"dead: {words}")
+        if button.isVisible() and button.isEnabled() and min(button.width(), button.height()) < 24:
+            problems.append(f"small: {words}")
+    return problems

@@ -1,4 +1,4 @@
-"""Every window but the participant's, opened with what a study would show in it."""
+"""Every window but the participant's, opened with sample data of a study."""
 
 import os
 from collections.abc import Callable
@@ -87,37 +87,37 @@ GOES_ON = (("Continues at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 
 OPENED = unblinding_text({"at": "2026-11-19", "by": "AK", "reason": "collection closed"})
 
 
-def shown(qtbot: Any, made: Any, size: tuple[int, int], theme: Any = LIGHT) -> Any:
-    """Return a window or a place on the screen."""
-    qtbot.addWidget(made)
-    if not hasattr(made, "given_theme"):
-        apply_theme(made, theme)
-    made.resize(*size)
-    made.show()
-    qtbot.waitExposed(made)
-    return made
+def show_window(qtbot: Any, window: Any, size: tuple[int, int], theme: Any = LIGHT) -> Any:
+    """Show a window or a page on the screen and return it."""
+    qtbot.addWidget(window)
+    if not hasattr(window, "given_theme"):
+        apply_theme(window, theme)
+    window.resize(*size)
+    window.show()
+    qtbot.waitExposed(window)
+    return window
 
 
 def devices(qtbot: Any) -> DevicesPlace:
     place: Any = DevicesPlace(DEFAULTS, lambda: FOUND)
     place.diagnose = lambda name: place.message.emit("diagnose", name)
-    made: DevicesPlace = shown(qtbot, place, (1200, 700), DARK)
-    made.show_devices(devices_shown(FOUND))
-    return made
+    window: DevicesPlace = show_window(qtbot, place, (1200, 700), DARK)
+    window.show_devices(devices_shown(FOUND))
+    return window
 
 
 def machine(qtbot: Any) -> MachinePlace:
     """Return the settings of a machine with two screens, if `two_screens` is used."""
-    made: MachinePlace = shown(qtbot, MachinePlace(), (1300, 760))
-    show_settings(made, DEFAULTS)
-    return made
+    window: MachinePlace = show_window(qtbot, MachinePlace(), (1300, 760))
+    show_settings(window, DEFAULTS)
+    return window
 
 
 def set_machine(qtbot: Any) -> MachinePlace:
-    made = machine(qtbot)
-    apply_theme(made, DARK)
-    show_settings(made, MachineSettings(viewing_distance_mm=600), undo="width of the screen")
-    return made
+    window = machine(qtbot)
+    apply_theme(window, DARK)
+    show_settings(window, MachineSettings(viewing_distance_mm=600), undo="width of the screen")
+    return window
 
 
 def show_settings(place: MachinePlace, settings: MachineSettings, undo: str = "") -> None:
@@ -144,15 +144,15 @@ def checked(
 def preflight(
     qtbot: Any, facts: Measurements = WELL, goes_on: tuple[tuple[str, str], ...] = (), **more: Any
 ) -> PreflightWindow:
-    made = PreflightWindow(1000.0, **more)
-    qtbot.addWidget(made)
-    made.show_view(checked(facts, error_n=0.004, goes_on=goes_on))
-    made.show()
-    return made
+    window = PreflightWindow(1000.0, **more)
+    qtbot.addWidget(window)
+    window.show_view(checked(facts, error_n=0.004, goes_on=goes_on))
+    window.show()
+    return window
 
 
 class Idle:
-    """Keeps its orders, in place of the process that reads studies."""
+    """A worker that stores its orders, in place of the process that reads studies."""
 
     works = True
 
@@ -169,7 +169,7 @@ class Idle:
     close = stop
 
 
-def results(qtbot: Any, seen: Any = None) -> ResultsPlace:
+def results(qtbot: Any, results_view: Any = None) -> ResultsPlace:
     """Return the results in their main window, with drawn figures."""
     where, idle = Path(os.sep, "somewhere", "results"), cast("Any", Idle)
     window = MainWindow({"home": Place, "results": lambda: ResultsPlace(where, opener=str, start_worker=idle)})
@@ -181,7 +181,7 @@ def results(qtbot: Any, seen: Any = None) -> ResultsPlace:
     place._choose_study = lambda _folder: None  # so that this study stays
     window.go("results")
     place.main = window  # or it would be collected here
-    place.show_view(seen or view())
+    place.show_view(results_view or view())
     qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.is_settled for card in place.figures.cards))
     return place  # type: ignore[no-any-return]
 
@@ -191,19 +191,19 @@ def opened_results(qtbot: Any) -> ResultsPlace:
 
 
 def lab(qtbot: Any) -> LabPlace:
-    made: LabPlace = shown(qtbot, LabPlace(), (1528, 900))
-    made.show_view(still_view())
-    return made
+    window: LabPlace = show_window(qtbot, LabPlace(), (1528, 900))
+    window.show_view(still_view())
+    return window
 
 
 def help_pages(qtbot: Any) -> HelpPlace:
-    made: HelpPlace = shown(qtbot, HelpPlace(), (1266, 768))
-    return made
+    window: HelpPlace = show_window(qtbot, HelpPlace(), (1266, 768))
+    return window
 
 
 def display_test(qtbot: Any, **clock: Any) -> DisplayTest:
-    made: DisplayTest = shown(qtbot, DisplayTest("Screen 1", 60.0, least_s=0.05, **clock), (1366, 768))
-    return made
+    window: DisplayTest = show_window(qtbot, DisplayTest("Screen 1", 60.0, least_s=0.05, **clock), (1366, 768))
+    return window
 
 
 PLACES = ((928, 640), (1294, 768), (1848, 1080))
@@ -212,17 +212,17 @@ PREFLIGHT = (LEAST_PREFLIGHT.toTuple(), (1366, 768))
 
 
 def dialog(kind: type[Any], qtbot: Any, folder: Any) -> QWidget:
-    made = kind(study_facts("rek2024"), folder)
-    qtbot.addWidget(made)
-    made.open()
-    return made  # type: ignore[no-any-return]
+    window = kind(study_facts("rek2024"), folder)
+    qtbot.addWidget(window)
+    window.open()
+    return window  # type: ignore[no-any-return]
 
 
 WINDOWS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
     "home": (lambda qtbot, folder: open_home(qtbot, folder).main, MAIN),
     "new session": (lambda qtbot, folder: dialog(NewSessionDialog, qtbot, folder), (None,)),
     "rehearsal": (lambda qtbot, folder: dialog(RehearsalDialog, qtbot, folder), (None,)),
-    "opening": (lambda qtbot, _: shown(qtbot, OpeningWindow("Preparing demo", "P001"), (500, 300)), (None,)),
+    "opening": (lambda qtbot, _: show_window(qtbot, OpeningWindow("Preparing demo", "P001"), (500, 300)), (None,)),
     "preflight": (lambda qtbot, _: preflight(qtbot, SCALED), PREFLIGHT),
     "preflight of a haptic device": (lambda qtbot, _: preflight(qtbot, SCALED, GOES_ON, asks_masking=True), PREFLIGHT),
     "results": (lambda qtbot, _: opened_results(qtbot).main, MAIN),

@@ -18,8 +18,8 @@ PRESETS = {
 def tank(name, *, scale=1.0, effects=("non_newtonian",), table=None, **fields):
     """Return a scene of one preset, by default with its drag alone, perhaps with another flow curve."""
     density_kg_m3, preset = PRESETS[name]
-    one = Liquid(id=name, density_kg_m3=density_kg_m3, effects=effects, non_newtonian=table or preset)
-    return Scene(liquids=(one,), scale=scale, **fields)
+    liquid = Liquid(id=name, density_kg_m3=density_kg_m3, effects=effects, non_newtonian=table or preset)
+    return Scene(liquids=(liquid,), scale=scale, **fields)
 
 
 def creep_mps(name, share, *, noise=0.0, scale=3.0):

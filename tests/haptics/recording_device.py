@@ -101,7 +101,7 @@ def _write(context, command):
 
 
 class Probe:
-    """Moves at ``velocity_mps`` from the origin on, once read; its memory may be given, to be shared with a process."""
+    """A device that moves at ``velocity_mps`` from its first reading; pass its memory to share it with a process."""
 
     name = "probe"
     force_limit_n = 8.0
@@ -125,5 +125,5 @@ class Probe:
         return self.state.forces_n[: self.state.writes].copy()
 
     def stall(self, clock, at_read, stall_ns):
-        """Let ``stall_ns`` of virtual time pass within one reading."""
+        """Make one reading take ``stall_ns`` of virtual time."""
         self.state.clock, self.state.stall_at_read, self.state.stall_ns = clock.context, at_read, stall_ns

@@ -1,4 +1,4 @@
-"""What tests of the servo share: waiting for its thread, and what it presents now."""
+"""Helpers for tests of the servo: waiting for its thread, and its present force."""
 
 import threading
 import time
@@ -13,7 +13,7 @@ from tests.haptics.scenes import HONEY
 
 
 def wait_until(condition, limit_s=30.0):
-    """Wait for another thread; a test that needs it fails rather than hangs."""
+    """Wait for a condition that another thread fulfils; fail instead of hanging."""
     waiting, end = threading.Event(), time.perf_counter() + limit_s
     while not condition():
         assert time.perf_counter() < end, "waited in vain"
@@ -35,15 +35,15 @@ def is_zero(force):
     return not np.any(force)
 
 
-def felt(servo, scene=HONEY):
-    """Bring the servo to where a force is felt."""
+def bring_to_force(servo, scene=HONEY):
+    """Load a scene and advance the servo until a force acts."""
     servo.load(scene)
     servo.advance(1000)
     assert force_n(servo.telemetry) > 1
 
 
 def recomputed(samples, scene=HONEY, dynamics=UNKNOWN, *, delivered=True):
-    """Return the samples of a scene's first presentation as they are computed again, and the state of safety."""
+    """Recompute the samples of a scene's first presentation; return them with the state of the safety layer."""
     again, safety = samples.copy(), new_safety(8.0)
     begin_scene(safety[0])
     trail, places = new_wake_places(10)

@@ -27,7 +27,7 @@ WATER_FACTOR = 0.5 * 1000 * 0.47 * np.pi * 0.034**2
 
 
 def examples(count: int) -> int:
-    """Return how many examples to try: compiled as asked, interpreted a tenth."""
+    """Return the number of examples to try: a tenth without compiled code."""
     return count if COMPILED else max(count // 10, 5)
 
 
@@ -122,9 +122,9 @@ class Hand:
     """Moves a model as a servo would: one call, one tick of 1 ms unless said otherwise."""
 
     def __init__(
-        self, felt: Scene, *, faded_in: bool = True, dynamics: Dynamics = UNKNOWN, rules: ForceRules = CURRENT
+        self, scene: Scene, *, faded_in: bool = True, dynamics: Dynamics = UNKNOWN, rules: ForceRules = CURRENT
     ) -> None:
-        self.model = pack(felt, dynamics=dynamics, rules=rules)
+        self.model = pack(scene, dynamics=dynamics, rules=rules)
         self.safety = new_safety()
         self.safety[0].fade = 1.0 if faded_in else 0.0
         self.sample = records(SAMPLE, 1)

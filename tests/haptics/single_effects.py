@@ -37,7 +37,7 @@ def in_lab(name: str) -> Scene:
     return with_parameter(EMPTY, f"effects.{name}", "on")
 
 
-def given(scene: Scene) -> Scene:
+def with_given_velocity(scene: Scene) -> Scene:
     """Return the scene with velocities as the motion gives them."""
     return scene.model_copy(update={"velocity": Given()})
 
@@ -65,7 +65,7 @@ def all_forces(ticks: int) -> Any:
     estimated = [
         vectors(simulate(with_parameter(EMPTY, "velocity.kind", it), places), "velocity") for it in ESTIMATOR_NAMES
     ]
-    return np.array([*(force_n(given(in_lab(name)), motion) for name in NAMES), *estimated])
+    return np.array([*(force_n(with_given_velocity(in_lab(name)), motion) for name in NAMES), *estimated])
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ PACES = {"even": [1.0], "jitter": [1.0, 0.7, 1.3, 0.1, 2.0], "late": [1.0] * 30 
 
 
 def walk(legs: Any, pace: str = "even") -> Motion:
-    """Return bursts, rests, creeping at the threshold of rest, reversals, exact turns and curves, Δt even or not."""
+    """Return a motion of bursts, rests, creeping, reversals, turns and curves, with even or uneven time steps."""
     velocities, heading = [], 0.0
     for ticks, speed, turn, curve, rise in legs:
         heading += np.radians(turn)
@@ -63,9 +63,9 @@ def walk(legs: Any, pace: str = "even") -> Motion:
     return moving(rows, 1e-3 * np.resize(PACES[pace], len(rows)))
 
 
-def difference(felt: Scene, motion: Motion) -> float:
+def difference(scene: Scene, motion: Motion) -> float:
     """Return the greatest |wake − definition| in units of Σ|e|/S, and check that the force follows."""
-    table, literal = simulate(felt, motion), respond(felt, motion)
+    table, literal = simulate(scene, motion), respond(scene, motion)
     error = np.linalg.norm(vectors(table, "wake") - literal.wake_mps, axis=1)
     assert not error[literal.size_mps == 0].any()
     assert (error[literal.size_mps < NOTHING_MPS] <= NOTHING_MPS).all()
@@ -76,14 +76,14 @@ def difference(felt: Scene, motion: Motion) -> float:
 
 
 def pass_time(hand: Hand, places_m: Any, ticks: int, *, after_ns: int = TICK_NS) -> Any:
-    """Let a hand go round ``places_m`` (n, 3) for many ticks at once; return the last sample."""
+    """Move a hand around ``places_m`` (n, 3) for many ticks at once; return the last sample."""
     _pass_time(hand.model, hand.safety[0], hand.sample[0], np.atleast_2d(places_m), ticks, after_ns)
     hand.time_ns = int(hand.sample[0].time_ns)
     return hand.sample.copy()[0]
 
 
 def all_numbers(model: Any) -> Any:
-    """Return every number that is not whole which a model keeps as its state, (n,)."""
+    """Return all floating-point numbers of a model's state, (n,)."""
 
     def flat(record: Any) -> list[Any]:
         if record.dtype.names:

@@ -96,15 +96,15 @@ print("used")
 """
 
 
-def edited(text: str, before: str, line: str) -> str:
-    """Return a text with a line put before the only place that begins so."""
+def with_line_before(text: str, before: str, line: str) -> str:
+    """Return a text with a line inserted before the only place that begins with these words."""
     assert text.count(before) == 1, before
     return text.replace(before, f"{line}\n{before}")
 
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """A folder with the package, patched: two new files, and a line in the tick with its imports."""
+    """Return a folder with a patched package: two new files, and a line in the tick with its imports."""
     skipped = shutil.ignore_patterns("__pycache__", "*.nbi", "*.nbc")
     shutil.copytree(ROOT / "study_app", tmp_path / "study_app", ignore=skipped)
     shutil.copytree(ROOT / "protocols", tmp_path / "protocols")
@@ -112,13 +112,13 @@ def copy(tmp_path: Path) -> Path:
     (haptics / "model" / "effects" / "spring.py").write_text(DESCRIPTOR, "utf-8")
     (haptics / "kernels" / "effects" / "spring.py").write_text(KERNEL, "utf-8")
     tick = haptics / "kernels" / "tick.py"
-    text = edited(
+    text = with_line_before(
         tick.read_text("utf-8"),
         "from study_app.haptics.kernels.effects.surface import",
         "from study_app.haptics.kernels.effects.spring import spring_force",
     )
     line = "    if liquid.effects & effects.spring.BIT:\n        spring_force(parameters, liquid, local, state)"
-    tick.write_text(edited(text, "    if liquid.effects & effects.history.BIT:", line), "utf-8")
+    tick.write_text(with_line_before(text, "    if liquid.effects & effects.history.BIT:", line), "utf-8")
     study = (ROOT / "protocols" / "demo.toml").read_text("utf-8")
     study = study.replace(
         'density_kg_m3 = 1400\neffects = ["drag"]', 'density_kg_m3 = 1400\neffects = ["drag", "spring"]'
@@ -129,7 +129,7 @@ def copy(tmp_path: Path) -> Path:
 
 
 def run(folder: Path, *words: str) -> str:
-    """Run the copy of the package in a process of its own, with a cache of its own; return what it printed."""
+    """Run the copied package in its own process with its own cache; return the output."""
     environment = os.environ | {
         "PYTHONPATH": str(folder),
         "PYTHONSAFEPATH": "1",

@@ -1,4 +1,4 @@
-"""Liquids with unsteady drag, motions in them, and how far symmetry, energy and the length of a tick are kept."""
+"""Liquids with unsteady drag, motions in them, and measures of their symmetry, energy and tick length."""
 
 import numpy as np
 
@@ -19,14 +19,14 @@ ADDED_M3 = 0.5 * np.pi / 6 * 0.068**3
 def tank(name, **fields):
     """Return a scene of one liquid with unsteady drag, at scale 1."""
     density_kg_m3, viscosity_pa_s = FLUIDS[name]
-    one = liquid(density_kg_m3, viscosity_pa_s=viscosity_pa_s, effects=("unsteady_drag",))
-    return scene(one.model_copy(update=fields), knee=UNBENT, scale=1.0)
+    medium = liquid(density_kg_m3, viscosity_pa_s=viscosity_pa_s, effects=("unsteady_drag",))
+    return scene(medium.model_copy(update=fields), knee=UNBENT, scale=1.0)
 
 
-def force(felt, velocity_mps, interval_s=1e-3):
+def force(scene_given, velocity_mps, interval_s=1e-3):
     """Return the force (n, 3) along velocities (n, 3)."""
-    felt = felt.model_copy(update={"rate_hz": 1 / float(np.median(interval_s))})
-    return vectors(simulate(felt, moving(velocity_mps, interval_s)), "force")
+    scene_given = scene_given.model_copy(update={"rate_hz": 1 / float(np.median(interval_s))})
+    return vectors(simulate(scene_given, moving(velocity_mps, interval_s)), "force")
 
 
 def random_motion(seed, ticks=3000, rest=300):
@@ -45,11 +45,11 @@ def random_motion(seed, ticks=3000, rest=300):
 
 def highest_gain(name, seeds):
     """Return the greatest net work on the hand since rest over ½ m_a v²."""
-    found = 0.0
+    highest = 0.0
     for seed in seeds:
         velocity = random_motion(seed)
         mean = (velocity + np.concatenate([np.zeros((1, 3)), velocity[:-1]])) / 2
         work_j = np.cumsum((force(tank(name), velocity) * mean).sum(axis=1) * 1e-3)
         top = (velocity**2).sum(axis=1).max()
-        found = max(found, work_j.max() / (0.5 * FLUIDS[name][0] * ADDED_M3 * top)) if top > 0 else found
-    return found
+        highest = max(highest, work_j.max() / (0.5 * FLUIDS[name][0] * ADDED_M3 * top)) if top > 0 else highest
+    return highest

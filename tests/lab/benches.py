@@ -1,4 +1,4 @@
-"""What the lab's tests share: a workbench, and a servo on a clock that only moves when told to."""
+"""Helpers for tests of the lab: a workbench, and a servo on a manual clock."""
 
 from random import Random
 
@@ -19,7 +19,7 @@ def bench(a: str = "water", b: str = "light_oil") -> Workbench:
 
 
 def scripted() -> ScriptedDevice:
-    """Return a hand that trembles always alike."""
+    """Return a scripted hand with reproducible tremor."""
     return ScriptedDevice(Random(1), workspace_m=(0.05, 0.03, 0.03))  # noqa: S311 - a hand keeps no secrets
 
 
@@ -29,7 +29,7 @@ def live_with(device: ScriptedDevice, *, elements: int = 10_000) -> Live:
 
 
 def run(live: Live, ticks: int, batch: int = 33) -> None:
-    """Let the servo take so many ticks, and the lab look at it every ``batch``."""
+    """Run this number of servo ticks, and poll the lab after every ``batch``."""
     for first in range(0, ticks, batch):
         live.servo.advance(min(batch, ticks - first))
         live.poll()

@@ -18,7 +18,7 @@ def bench() -> Workbench:
     return Workbench(Setting("Water", water, water), Setting("Light oil", oil, oil))
 
 
-def test_a_refused_edit_says_why_and_leaves_everything() -> None:
+def test_a_refused_edit_states_the_reason_and_changes_nothing() -> None:
     with pytest.raises(StudyError, match="outrun"):
         bench().change("wake.length", 1701.0)
 
@@ -94,14 +94,14 @@ def test_undo_takes_everything_back_and_redo_makes_it_again(steps: list[tuple[st
 
 
 def test_blinding_hides_names_and_edits_and_draws_both_sides() -> None:
-    seen: set[tuple[Side, Side]] = set()
+    drawn_sides: set[tuple[Side, Side]] = set()
     for seed in range(40):
         blind = bench().blinded(Random(seed))  # noqa: S311 - a test draws
-        seen.add((blind.first, blind.presented))
+        drawn_sides.add((blind.first, blind.presented))
         assert {blind.shown_name("A"), blind.shown_name("B")} == {"Setting 1", "Setting 2"}
         assert blind.shown_name(blind.first) == "Setting 1"
         assert (blind.a, blind.b) == (bench().a, bench().b)
-    assert len(seen) == 4
+    assert len(drawn_sides) == 4
 
 
 def test_while_blind_nothing_can_be_edited_and_switching_goes_on() -> None:

@@ -1,4 +1,4 @@
-"""Device and servo of the lab: what is edited is felt at once, and every way out ends in zero force."""
+"""Device and servo of the lab: edits are felt at once, and every way out ends in zero force."""
 
 import numba
 import numpy as np
@@ -45,7 +45,7 @@ def test_a_scene_is_presented_by_the_next_tick_and_felt_whole_within_fifty() -> 
     live.close()
 
 
-def test_exchanging_what_is_not_felt_leaves_the_servo_alone() -> None:
+def test_exchanging_the_other_side_leaves_the_servo_unchanged() -> None:
     live = live_with(scripted())
     sides = bench()
     live.feel(sides)
@@ -185,7 +185,7 @@ def test_an_exception_on_the_way_ends_in_zero_force() -> None:
     assert np.linalg.norm(device.state.handle.force_n) == 0.0
 
 
-def test_a_fault_is_told_and_nothing_more_is_presented() -> None:
+def test_a_fault_is_reported_and_ends_the_presentation() -> None:
     device = scripted()
     live = live_with(device)
     live.feel(bench())

@@ -1,4 +1,4 @@
-"""Which parameters a liquid has: every range can be set, every number stands where its name says."""
+"""The parameters of a liquid: every range can be set, and every value is stored under its name."""
 
 from typing import Any
 
@@ -71,7 +71,7 @@ def test_another_current_or_region_begins_as_large_as_the_hand_reaches() -> None
     assert value_of(with_parameter(boxed, "effects.surface", "on"), "effects.surface") == "on"
 
 
-def test_effects_bring_what_they_cannot_do_without() -> None:
+def test_effects_add_the_effects_that_they_require() -> None:
     scene = Scene(liquids=(Liquid(id="thin", density_kg_m3=1000.0, effects=()),))
     with_wake = with_parameter(scene, "effects.wake", "on")
     assert with_wake.liquids[0].effects == ("drag", "wake")
@@ -93,7 +93,7 @@ def test_effects_by_hand_begin_as_the_gate_chose_them() -> None:
     assert with_parameter(honey, "effects.non_newtonian", "on").liquids[0].viscosity_pa_s is None
 
 
-def test_the_lab_takes_one_liquid_and_no_given_velocity() -> None:
+def test_the_lab_refuses_several_liquids_and_a_given_velocity() -> None:
     water = SCENES["rek2024/water"]
     with pytest.raises(StudyError, match="one liquid at a time"):
         sections(Scene())
@@ -106,8 +106,8 @@ def test_a_linear_damper_has_its_damping_as_a_parameter() -> None:
     assert "drag.damping_nspm" not in {it.name for section in sections(honey) for it in section.parameters}
     damper = with_parameter(honey, "drag.law", "linear")
     assert damper.liquids[0].drag == Drag(law="linear", damping_nspm=8)
-    found = parameter(damper, "drag.damping_nspm")
-    assert (found.least, found.most, found.unit) == (0.01, 200, "N·s/m")
+    damping = parameter(damper, "drag.damping_nspm")
+    assert (damping.least, damping.most, damping.unit) == (0.01, 200, "N·s/m")
     heavier = with_parameter(damper, "drag.damping_nspm", 20.0)
     assert value_of(heavier, "drag.damping_nspm") == 20
     assert with_parameter(heavier, "drag.law", "constant").liquids[0].drag == Drag()
@@ -134,7 +134,7 @@ def test_sections_hold_the_parameters_that_a_liquid_has_in_the_order_of_the_mode
         parameter(SCENES["rek2024/water"], "history.window_s")
 
 
-def test_a_component_of_a_vector_is_set_alone() -> None:
+def test_a_single_component_of_a_vector_can_be_set() -> None:
     moved = SCENES["rek2024/water"].model_copy(update={"origin_m": (0.25, 0.5, -0.125)})
     cylinder = with_parameter(moved, "region.kind", "cylinder")
     region: Any = cylinder.liquids[0].region
@@ -150,7 +150,7 @@ def test_a_component_of_a_vector_is_set_alone() -> None:
     assert (box.centre_m, box.size_m) == ((0.25, 0.5, -0.125), (1.0, 1.0, 1.0))  # type: ignore[union-attr]
 
 
-def test_the_ends_of_a_range_are_permitted_and_what_is_no_choice_is_named() -> None:
+def test_the_ends_of_a_range_are_permitted_and_invalid_choices_are_named() -> None:
     water = SCENES["rek2024/water"]
     density = parameter(water, "liquid.density_kg_m3")
     assert (density.least, density.most, density.default) == (1.0, 25000.0, 1000.0)

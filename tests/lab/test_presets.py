@@ -1,4 +1,4 @@
-"""Liquids at hand, and settings kept as files that read back as they were."""
+"""Available liquids, and presets that are read back as they were saved."""
 
 from pathlib import Path
 
@@ -73,7 +73,7 @@ def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_brok
     assert water.setting().origin == water.scene.model_copy(update={"velocity": Kalman()})
 
 
-def test_a_preset_says_whose_it_is_and_what_was_changed(tmp_path: Path) -> None:
+def test_a_preset_states_its_origin_and_its_changes(tmp_path: Path) -> None:
     origin = load_scene("rek2024", "honey")
     changed = with_parameter(with_parameter(origin, "liquid.density_kg_m3", 1500.0), "velocity.kind", "raw")
     unchanged, text = (preset_text(Setting("Honey", origin, scene)) for scene in (origin, changed))

@@ -17,8 +17,8 @@ def test_a_hand_is_led_from_rest_to_rest_at_8_cm_a_second_or_in_half_a_second(wa
     assert led.t_s == pytest.approx(np.arange(rows + 2) / 1000)
     assert led.position_m[rows:].tolist() == path.position_m.tolist()
     assert (led.position_m[:, 1:] == [0.01, 0.0]).all()
-    done = (led.position_m[: rows + 1, 0] - 0.02) / way_m
-    quarters = done[[0, rows // 4, rows // 2, 3 * rows // 4, rows]]
+    progress = (led.position_m[: rows + 1, 0] - 0.02) / way_m
+    quarters = progress[[0, rows // 4, rows // 2, 3 * rows // 4, rows]]
     assert quarters == pytest.approx([0.0, 53 / 512, 0.5, 1 - 53 / 512, 1.0]), "minimum jerk"
 
 

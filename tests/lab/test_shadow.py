@@ -1,4 +1,4 @@
-"""What was felt, recomputed outside the servo: the same bits, and the other liquid on the same motion."""
+"""The felt force recomputed outside the servo, exactly, and the other liquid on the same motion."""
 
 import numba
 import numpy as np
@@ -73,7 +73,7 @@ def test_the_other_sides_kalman_filter_knows_the_force_that_was_sent() -> None:
     live.close()
 
 
-def test_the_other_side_is_what_it_would_be_were_it_felt() -> None:
+def test_the_other_side_equals_its_force_if_presented() -> None:
     beside = live_with(scripted())
     quiet = with_parameter(SCENES["water"], "liquid.density_kg_m3", 1.0)
     beside.feel(Workbench(Setting("hardly there", quiet, quiet), bench().b))
@@ -83,12 +83,12 @@ def test_the_other_side_is_what_it_would_be_were_it_felt() -> None:
     alone = Shadow(Scene(), 10_000, 8.0, without_servo=True)
     alone.expect(1, "B", quiet, SCENES["light_oil"])
     alone.process_samples(recorded)
-    one, other = beside.trace(), alone.trace()
-    assert one is not None
-    assert other is not None
-    assert np.array_equal(one.force_b_n, other.force_b_n)
-    assert np.array_equal(one.wake_b_mps, other.wake_b_mps)
-    assert np.abs(one.force_b_n - one.force_a_n).max() > 1.0
+    beside_trace, alone_trace = beside.trace(), alone.trace()
+    assert beside_trace is not None
+    assert alone_trace is not None
+    assert np.array_equal(beside_trace.force_b_n, alone_trace.force_b_n)
+    assert np.array_equal(beside_trace.wake_b_mps, alone_trace.wake_b_mps)
+    assert np.abs(beside_trace.force_b_n - beside_trace.force_a_n).max() > 1.0
     beside.close()
 
 
@@ -135,7 +135,7 @@ def test_a_long_tail_is_drawn_with_all_corners_or_the_newest_200_and_even_rows()
     assert list(module._rows_to_draw(breaks[:400])) == [*range(400)]
 
 
-def test_a_tail_forgets_what_falls_off_it() -> None:
+def test_a_tail_drops_its_oldest_elements() -> None:
     scene = with_parameter(SCENES["water"], "wake.length", 100.0)
     shadow = Shadow(Scene(), 2000, 8.0, without_servo=True)
     shadow.expect(1, "A", scene, SCENES["honey"])

@@ -11,7 +11,7 @@ from study_app.session.simulated import rehearsal
 
 
 class Collector:
-    """Takes the place of ``Outlets``; ``lost`` is what a test says."""
+    """A stand-in for ``Outlets``; tests set ``lost``."""
 
     def __init__(self) -> None:
         self.markers: list[Marker] = []

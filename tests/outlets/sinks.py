@@ -12,13 +12,13 @@ from study_app.outlets.markers import Marker, marker_of
 
 
 def marker(trial: int = 1, event: str = "trial_started", time_s: float = 1.0) -> Marker:
-    made = marker_of(event, time_s, 0, {"trial": trial})
-    assert made is not None
-    return made
+    built_marker = marker_of(event, time_s, 0, {"trial": trial})
+    assert built_marker is not None
+    return built_marker
 
 
 class Sink:
-    """Keeps what it is sent; fails at, or hangs in, the marker of a trial."""
+    """A sink that keeps its markers, and fails or hangs at the marker of a trial."""
 
     title = "Test port"
     listens = None
@@ -59,7 +59,7 @@ print(json.dumps({"xml": info.as_xml(), "rate": info.nominal_srate(), "samples":
 
 
 class Recorder:
-    """A recording program that knows nothing of this one: it takes so many samples of a stream by its name."""
+    """An independent recording program that receives a number of samples of a stream by name."""
 
     def __init__(self, name: str, count: int) -> None:
         self._process = subprocess.Popen(

@@ -37,7 +37,7 @@ class Ioctl:
     def __call__(self, _file: int, request: int, *value: bytes) -> None:
         if request == self.fails_at:
             raise OSError(6, "No such device or address")
-        self.calls.append((request, *(one[0] for one in value)))
+        self.calls.append((request, *(element[0] for element in value)))
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ def parallel(parport: str) -> Iterator[tuple[Any, str, Callable[[], list[int]]]]
     sink = TriggerSink(ParallelPort(parport, ioctl), time.perf_counter_ns)
 
     def received() -> list[int]:
-        """Return the lines after each strobe, and that they are set before it."""
+        """Return the data lines at each strobe; check that they are set before it."""
         assert ioctl.calls[:2] == [(PPEXCL,), (PPCLAIM,)]
         assert ioctl.calls[-1] == (PPRELEASE,)
         calls = ioctl.calls[2:-1]
@@ -122,16 +122,16 @@ def test_every_kind_is_tried_here() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_other_end_gets_each_event_in_order(kind: str, parport: str) -> None:
+def test_the_receiver_gets_every_event_in_order(kind: str, parport: str) -> None:
     with KINDS[kind](parport) as (sink, address, received):
         thread = SinkThread(sink)
         for event in EVENTS:
             thread.mark(marker(event=event))
-        described = json.loads(json.dumps(dict(thread.sink.described)))
-        thread.close(5)  # a program that receives gets the last ones all the same
+        description = json.loads(json.dumps(dict(thread.sink.described)))
+        thread.close(5)  # the receiver still gets the last events
         assert received() == PULSES
         if kind != "lsl":
-            assert described == {"address": address, "high_ms": 10.0, "codes": dict(CODES)}
+            assert description == {"address": address, "high_ms": 10.0, "codes": dict(CODES)}
         assert thread.lost == ""
         assert thread.sink.title in {"Serial port", "Parallel port", "LSL markers"}
 
@@ -151,12 +151,12 @@ def test_the_other_end_gets_each_event_in_order(kind: str, parport: str) -> None
         ("usb:1", "'usb:1' is not a marker address: use one such as lsl, parallel:/dev/par"),
     ],
 )
-def test_an_address_where_nothing_is_is_refused_in_a_line(address: str, words: str) -> None:
+def test_an_address_without_a_server_is_refused_in_one_line(address: str, words: str) -> None:
     if address.startswith("serial"):
         pytest.importorskip("serial", reason="pyserial is not installed")
-    with pytest.raises(OutletError, match=words) as refused:
+    with pytest.raises(OutletError, match=words) as error:
         open_sink(address, time.perf_counter_ns)
-    assert "\n" not in str(refused.value)
+    assert "\n" not in str(error.value)
 
 
 def test_a_port_has_a_kind_with_places_and_a_place() -> None:
@@ -167,13 +167,13 @@ def test_a_port_has_a_kind_with_places_and_a_place() -> None:
 
 
 def test_a_serial_port_that_is_missing_on_windows_is_said_in_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The exception of pyserial carries no number there, but the representation of the system's error."""
+    """There, pyserial's exception has the text of the system's error instead of its number."""
     serial = pytest.importorskip("serial", reason="pyserial is not installed")
     message = "could not open port 'COM9': FileNotFoundError(2, 'The system cannot find the file specified.', None, 2)"
     monkeypatch.setattr(serial, "Serial", mock.Mock(side_effect=serial.SerialException(message)))
-    with pytest.raises(OutletError) as refused:
+    with pytest.raises(OutletError) as error:
         open_sink("serial:COM9", time.perf_counter_ns)
-    assert str(refused.value) == "serial:COM9 cannot be opened: The system cannot find the file specified"
+    assert str(error.value) == "serial:COM9 cannot be opened: The system cannot find the file specified"
 
 
 def test_each_byte_has_left_the_serial_port_before_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,7 +192,7 @@ def test_each_byte_has_left_the_serial_port_before_the_next(monkeypatch: pytest.
 @pytest.mark.parametrize(
     ("module", "address", "extra"), [("serial", "serial:/dev/ttyUSB0", "triggers"), ("pylsl", "lsl", "lsl")]
 )
-def test_without_the_extra_the_message_says_what_to_install(
+def test_the_message_names_the_missing_extra(
     module: str, address: str, extra: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)

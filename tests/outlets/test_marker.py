@@ -22,12 +22,12 @@ ORIGIN_NS = 5_000_000_000
 TRIAL = {"trial": 3, "attempt": 1, "block": "liquids", "phase": "main", "part": 1, "index": 2, "of": 4, "code": "L2"}
 
 
-def test_a_marker_says_what_happened_where_and_when() -> None:
+def test_a_marker_states_the_event_its_trial_and_its_time() -> None:
     marker = marker_of("trial_started", 12.3456789, ORIGIN_NS, TRIAL)
     assert marker is not None
     assert marker.time_ns == ORIGIN_NS + 12_345_678_900
-    said = {"trial": 3, "attempt": 1, "block": "liquids", "phase": "main", "code": "L2"}
-    assert json.loads(marker.text) == {"event": "trial_started", **said, "t_s": 12.345679, "trigger": 10}
+    fields = {"trial": 3, "attempt": 1, "block": "liquids", "phase": "main", "code": "L2"}
+    assert json.loads(marker.text) == {"event": "trial_started", **fields, "t_s": 12.345679, "trigger": 10}
     assert "\n" not in marker.text
 
 
@@ -46,7 +46,9 @@ def test_a_marker_says_what_happened_where_and_when() -> None:
         ("session_started", {"participant": "P007", "seed": 7, "operator": "AK", "limits": {"lateness_ms": 2.0}}),
     ],
 )
-def test_a_marker_holds_no_answer_measure_text_or_sealed_field(event: str, fields: dict[str, object]) -> None:
+def test_a_marker_contains_neither_answers_measures_texts_nor_sealed_fields(
+    event: str, fields: dict[str, object]
+) -> None:
     marker = marker_of(event, 1.0, 0, fields)
     assert marker is not None
     assert set(json.loads(marker.text)) <= {"event", "t_s", "trigger", *TRIAL, "interval", "item"} - {"part", "of"}
@@ -63,15 +65,15 @@ def test_codes_are_bytes_of_events_of_the_journal_and_differ() -> None:
 def test_markers_are_sent_in_order_and_the_rest_at_the_end() -> None:
     sink = Sink()
     thread = SinkThread(sink)
-    given = [marker(trial) for trial in range(1, 50)]
-    for one in given:
-        thread.mark(one)
+    markers = [marker(trial) for trial in range(1, 50)]
+    for sent_marker in markers:
+        thread.mark(sent_marker)
     thread.close(5)
-    assert sink.sent == given
+    assert sink.sent == markers
     assert sink.closed.is_set()
     assert thread.lost == ""
     thread.mark(marker(50))
-    assert sink.sent == given
+    assert sink.sent == markers
 
 
 def test_a_failure_is_kept_and_later_markers_are_dropped() -> None:
@@ -93,7 +95,7 @@ def test_a_failure_is_kept_and_later_markers_are_dropped() -> None:
 
 
 class Clock:
-    """Stands in for ``perf_counter``; `read` is called when a test's own thread reads it."""
+    """A stand-in for ``perf_counter``; `read` is called when the test's thread reads it."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
@@ -109,9 +111,9 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """Replace the clock of sinks."""
-    made = Clock()
-    monkeypatch.setattr(module, "perf_counter", made)
-    return made
+    fake_clock = Clock()
+    monkeypatch.setattr(module, "perf_counter", fake_clock)
+    return fake_clock
 
 
 def test_a_sink_that_hangs_is_lost_at_the_first_marker_after_the_limit(clock: Clock) -> None:
@@ -225,7 +227,7 @@ class Node:
 
 
 class Library:
-    """Stands in for pylsl: keeps the descriptions of streams and what is pushed; its clock reads 50 s."""
+    """A stand-in for pylsl that keeps stream descriptions and pushed samples; its clock reads 50 s."""
 
     def __init__(self) -> None:
         self.created: list[tuple[object, ...]] = []
@@ -247,7 +249,7 @@ class Library:
         )
 
 
-def test_both_streams_say_what_they_contain_and_map_times_to_the_librarys_clock(
+def test_both_streams_describe_their_content_and_map_times_to_the_librarys_clock(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The servo's clock reads 0, 4, 8, … 60 µs at the start, so the last of 8 readings of 50 s was at 58 ± 2 µs."""

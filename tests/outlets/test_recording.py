@@ -30,23 +30,23 @@ OF_LINE = "ms of a straight line"
 
 
 @pytest.fixture(scope="module")
-def streamed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[str, Rows]]]:
-    """A rehearsed study, and what a recorder in another process received of a session's markers, and of 300 samples."""
+def streamed_session(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[str, Rows]]]:
+    """A rehearsed study, and the markers and 300 samples of a session that a recorder process received."""
     study = tmp_path_factory.mktemp("streamed") / "study"
     with collecting() as collector:
         rehearse("demo", participants=2, seed=1, results=study)
     servo = Servo()
     thread = SinkThread(open_sink("lsl", servo.now_ns))
     stream = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
-    markers = collector.markers[: 1 + [one.event for one in collector.markers].index("session_ended")]
+    markers = collector.markers[: 1 + [marker.event for marker in collector.markers].index("session_ended")]
     recorders = [Recorder(f"liquid-study {n}", c) for n, c in (("markers", len(markers)), ("samples", 300))]
     for marker in markers:
         thread.mark(marker)
     servo.telemetry.batches.append(samples_of(300, first=LAST - 100))
-    found = [recorder.found() for recorder in recorders]
+    streams = [recorder.found() for recorder in recorders]
     thread.close(5)
     stream.close()
-    return study, [(one["xml"], one["samples"]) for one in found]
+    return study, [(stream["xml"], stream["samples"]) for stream in streams]
 
 
 def without(first: int, last: int) -> Callable[[Rows], Rows]:
@@ -86,39 +86,41 @@ def added(place: int) -> Callable[[Rows], Rows]:
         (without(0, 9999), list, "own.xdf: it does not contain markers from this study's sessions", 3),
     ],
 )
-def test_what_a_recording_lacks_is_found(
-    streamed: Any, tmp_path: Path, markers: Any, samples: Any, said: str, code: int
+def test_missing_parts_of_a_recording_are_found(
+    streamed_session: Any, tmp_path: Path, markers: Any, samples: Any, said: str, code: int
 ) -> None:
-    study, ((first, texts), (second, values)) = streamed
+    study, ((first, texts), (second, values)) = streamed_session
     file = write_xdf(tmp_path / "own.xdf", [(first, markers(texts), OFFSETS), (second, samples(values), OFFSETS)])
-    done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
-    assert said in done.output
-    assert done.exit_code == code
+    result = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
+    assert said in result.output
+    assert result.exit_code == code
     clock = r"clock of 'liquid-study samples': 0 resets; drift \+2 ppm over 95 s, with offsets within (\S+) ms of"
-    (offset_ms,) = re.findall(clock, done.output)
+    (offset_ms,) = re.findall(clock, result.output)
     assert float(offset_ms) < 1e-6
     if markers is list:
-        assert re.search(r"sub-P001/ses-01: (\d+) of \1 recorded, 0 lost; times agree within [\d.e-]+ ms", done.output)
-    assert "sub-P002" not in done.output
+        assert re.search(
+            r"sub-P001/ses-01: (\d+) of \1 recorded, 0 lost; times agree within [\d.e-]+ ms", result.output
+        )
+    assert "sub-P002" not in result.output
 
 
-def test_an_empty_stream_beside_the_session_is_no_error(streamed: Any, tmp_path: Path) -> None:
-    study, ((first, texts), _) = streamed
+def test_an_empty_stream_beside_the_session_is_not_an_error(streamed_session: Any, tmp_path: Path) -> None:
+    study, ((first, texts), _) = streamed_session
     for streams in ([(first, [], ()), (first, texts, OFFSETS)], [(first, texts, OFFSETS), (first, [], OFFSETS)]):
         file = write_xdf(tmp_path / "own.xdf", streams)
-        done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
-        assert done.exit_code == 0
-        assert "markers: none recorded\n" in done.output
-        assert "no marker of this study's sessions" not in done.output
+        result = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
+        assert result.exit_code == 0
+        assert "markers: none recorded\n" in result.output
+        assert "no marker of this study's sessions" not in result.output
 
 
-def test_a_reset_clock_is_told(streamed: Any, tmp_path: Path) -> None:
-    study, ((first, texts), _) = streamed
+def test_a_reset_clock_is_reported(streamed_session: Any, tmp_path: Path) -> None:
+    study, ((first, texts), _) = streamed_session
     offsets = [*OFFSETS, *((time_s - 99, offset_s + 60) for time_s, offset_s in OFFSETS)]
     file = write_xdf(tmp_path / "own.xdf", [(first, texts, offsets)])
-    done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
-    assert "1 reset; drift +2 ppm over 95 s" in done.output
-    assert "drift +2 ppm" in done.output.split("drift +2 ppm", 1)[1]
+    result = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
+    assert "1 reset; drift +2 ppm over 95 s" in result.output
+    assert "drift +2 ppm" in result.output.split("drift +2 ppm", 1)[1]
 
 
 @pytest.mark.parametrize(
@@ -146,13 +148,13 @@ def test_a_reset_clock_is_told(streamed: Any, tmp_path: Path) -> None:
     ],
 )
 def test_the_drift_of_a_clock_is_fitted_to_three_offsets_or_more(
-    streamed: Any, tmp_path: Path, times_s: tuple[float, ...], offsets_s: tuple[float, ...], drift: str
+    streamed_session: Any, tmp_path: Path, times_s: tuple[float, ...], offsets_s: tuple[float, ...], drift: str
 ) -> None:
-    study, (_, (samples_xml, samples)) = streamed
+    study, (_, (samples_xml, samples)) = streamed_session
     offsets = tuple(zip(times_s, offsets_s, strict=True))
     file = write_xdf(tmp_path / "own.xdf", [(samples_xml, samples, offsets)])
-    done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)], catch_exceptions=False)
-    assert f"clock of 'liquid-study samples': {drift}\n" in done.output
+    result = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)], catch_exceptions=False)
+    assert f"clock of 'liquid-study samples': {drift}\n" in result.output
 
 
 @pytest.mark.parametrize(
@@ -162,20 +164,20 @@ def test_the_drift_of_a_clock_is_fitted_to_three_offsets_or_more(
         *(("<channel_count>1<", "<channel_count>0<"), ("<nominal_srate>1000.0", "<nominal_srate>0"), ("label>", "x>")),
     ],
 )
-def test_a_file_that_cannot_be_used_ends_in_one_line(streamed: Any, tmp_path: Path, content: Any) -> None:
-    study, streams = streamed
+def test_a_file_that_cannot_be_used_ends_in_one_line(streamed_session: Any, tmp_path: Path, content: Any) -> None:
+    study, streams = streamed_session
     file = tmp_path / "own.xdf"
     if isinstance(content, tuple):
-        xml, rows = next(one for one in reversed(streams) if content[0] in one[0])
+        xml, rows = next(stream for stream in reversed(streams) if content[0] in stream[0])
         write_xdf(file, [(xml.replace(*content), rows, ())])
     elif content is not None:
         file.write_bytes(content)
-    done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
-    assert "own.xdf" in str(done.exception)
-    assert type(done.exception).__name__ == "StoreError"
+    result = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
+    assert "own.xdf" in str(result.exception)
+    assert type(result.exception).__name__ == "StoreError"
 
 
-def test_without_the_reader_it_says_what_to_install(streamed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_verify_without_the_xdf_reader_names_the_extra(streamed_session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyxdf", None)
-    done = CliRunner().invoke(commands, ["verify", str(streamed[0]), "--xdf", "own.xdf"])
-    assert str(done.exception) == "reading an XDF file needs pyxdf: pip install 'liquid-study[lsl]'"
+    result = CliRunner().invoke(commands, ["verify", str(streamed_session[0]), "--xdf", "own.xdf"])
+    assert str(result.exception) == "reading an XDF file needs pyxdf: pip install 'liquid-study[lsl]'"

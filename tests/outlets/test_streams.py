@@ -50,26 +50,26 @@ class Servo:
 
 
 def samples_of(count: int, first: int = 0) -> Any:
-    made = np.zeros(count, SAMPLE)
+    recording = np.zeros(count, SAMPLE)
     ticks = first + np.arange(count)
-    made["tick"], made["time_ns"] = ticks, START_NS + 1_000_000 * ticks
+    recording["tick"], recording["time_ns"] = ticks, START_NS + 1_000_000 * ticks
     for axis in range(3):
-        made["position_m"][:, axis] = 0.001 * ticks + axis
-        made["velocity_mps"][:, axis] = 0.01 * ticks + 10 * axis
-        made["device_force_n"][:, axis] = 0.1 * ticks + 100 * axis
-    made["limiters"] = np.where(ticks % 2, LIMITER_ENERGY | LIMITER_SLEW, 0)
-    return made
+        recording["position_m"][:, axis] = 0.001 * ticks + axis
+        recording["velocity_mps"][:, axis] = 0.01 * ticks + 10 * axis
+        recording["device_force_n"][:, axis] = 0.1 * ticks + 100 * axis
+    recording["limiters"] = np.where(ticks % 2, LIMITER_ENERGY | LIMITER_SLEW, 0)
+    return recording
 
 
 def test_channels_are_position_velocity_force_sent_limiters_and_tick() -> None:
-    made = samples_of(2, first=1)
-    made["tick"] += 2**24  # as 32-bit floats, the last would be even
-    made["command_n"], made["force_n"] = -5, -6
+    samples = samples_of(2, first=1)
+    samples["tick"] += 2**24  # as 32-bit floats, the last would be even
+    samples["command_n"], samples["force_n"] = -5, -6
     expected = [
         [0.001, 1.001, 2.001, 0.01, 10.01, 20.01, 0.1, 100.1, 200.1, LIMITER_ENERGY | LIMITER_SLEW, 1],
         [0.002, 1.002, 2.002, 0.02, 10.02, 20.02, 0.2, 100.2, 200.2, 0, 2],
     ]
-    np.testing.assert_allclose(channels_of(made), expected, rtol=1e-6)
+    np.testing.assert_allclose(channels_of(samples), expected, rtol=1e-6)
     assert len(CHANNELS) == 11
 
 
@@ -81,21 +81,21 @@ def test_a_recorder_gets_every_sample_with_the_time_of_its_reading() -> None:
     recorder = Recorder("liquid-study samples", 250)
     assert stream.listens
     servo.telemetry.batches.extend((samples_of(17), samples_of(232, first=17), samples_of(1, first=249)))
-    found = recorder.found()
+    stream_content = recorder.found()
     servo.telemetry.dropped = 12
     stream.close()
     assert not stream.listens
-    values, stamps_s = zip(*found["samples"], strict=True)
+    values, stamps_s = zip(*stream_content["samples"], strict=True)
     np.testing.assert_array_equal(np.array(values, np.float32), channels_of(samples_of(250)))
     offset_s = pylsl.local_clock() - 1e-9 * time.perf_counter_ns()
     np.testing.assert_allclose(np.array(stamps_s), 1e-9 * samples_of(250)["time_ns"] + offset_s, atol=1e-3)
     assert np.diff(stamps_s) == pytest.approx(1e-3, abs=1e-6)
-    assert found["rate"] == 1000.0
+    assert stream_content["rate"] == 1000.0
     assert stream.sent == 250
     assert stream.lost == "12 samples could not be sent in time: this computer is too busy"
     for label, unit in (("position_x", "m"), ("velocity_z", "m/s"), ("force_y", "N")):
-        assert f"<label>{label}</label>\n\t\t\t\t<unit>{unit}</unit>" in found["xml"]
-    assert "<label>limiters</label>" in found["xml"]
+        assert f"<label>{label}</label>\n\t\t\t\t<unit>{unit}</unit>" in stream_content["xml"]
+    assert "<label>limiters</label>" in stream_content["xml"]
 
 
 @slow
@@ -104,25 +104,25 @@ def test_a_recorder_gets_markers_with_the_times_of_their_events() -> None:
     assert thread.sink.listens is False
     recorder = Recorder("liquid-study markers", 3)
     assert thread.sink.listens is True
-    given = [marker(trial, time_s=START_NS * 1e-9 + trial) for trial in (1, 2, 3)]
-    for one in given:
-        thread.mark(one)
-    found = recorder.found()
+    markers = [marker(trial, time_s=START_NS * 1e-9 + trial) for trial in (1, 2, 3)]
+    for sent_marker in markers:
+        thread.mark(sent_marker)
+    stream = recorder.found()
     thread.close(5)
     assert thread.lost == ""
     offset_s = pylsl.local_clock() - 1e-9 * time.perf_counter_ns()
-    for (texts, stamp_s), one in zip(found["samples"], given, strict=True):
-        assert texts == [one.text]
-        assert stamp_s == pytest.approx(1e-9 * one.time_ns + offset_s, abs=1e-3)
-    assert found["rate"] == 0.0
-    assert "<trial_started>10</trial_started>" in found["xml"]
+    for (texts, stamp_s), sent_marker in zip(stream["samples"], markers, strict=True):
+        assert texts == [sent_marker.text]
+        assert stamp_s == pytest.approx(1e-9 * sent_marker.time_ns + offset_s, abs=1e-3)
+    assert stream["rate"] == 0.0
+    assert "<trial_started>10</trial_started>" in stream["xml"]
 
 
 @slow
 def test_strangers_at_the_port_of_a_stream_disturb_neither_its_recorder_nor_its_end() -> None:
     thread = SinkThread(open_sink("lsl", time.perf_counter_ns))
-    described = thread.sink._outlet.get_info().as_xml()
-    with visited(int(described.partition("<v4data_port>")[2].partition("<")[0])):
+    description = thread.sink._outlet.get_info().as_xml()
+    with visited(int(description.partition("<v4data_port>")[2].partition("<")[0])):
         recorder = Recorder("liquid-study markers", 3)
         for trial in (1, 2, 3):
             thread.mark(marker(trial))
@@ -135,12 +135,12 @@ def test_strangers_at_the_port_of_a_stream_disturb_neither_its_recorder_nor_its_
 
 @slow
 @pytest.mark.nightly
-def test_a_recorder_that_is_killed_loses_nothing_of_the_next() -> None:
+def test_a_killed_recorder_does_not_affect_the_next() -> None:
     thread = SinkThread(open_sink("lsl", time.perf_counter_ns))
     servo = Servo()
     stream = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
-    gone = [Recorder(f"liquid-study {name}", 10_000) for name in ("markers", "samples")]
-    for recorder in gone:
+    recorders = [Recorder(f"liquid-study {name}", 10_000) for name in ("markers", "samples")]
+    for recorder in recorders:
         recorder.kill()
     servo.telemetry.batches.append(samples_of(20))
     thread.mark(marker(1))
@@ -153,7 +153,9 @@ def test_a_recorder_that_is_killed_loses_nothing_of_the_next() -> None:
     thread.close(5)
     stream.close()
     assert (thread.lost, stream.lost, stream.sent) == ("", "", 21)
-    assert not [one for one in threading.enumerate() if one.name.startswith("outlet")]
+    assert not [
+        thread_of_outlet for thread_of_outlet in threading.enumerate() if thread_of_outlet.name.startswith("outlet")
+    ]
 
 
 @slow
@@ -170,18 +172,20 @@ def test_samples_are_off_in_double_blind_studies_unless_they_are_asked_for(
     choice: Any, blinding: str, streams: bool, withheld: bool
 ) -> None:
     outlets = Outlets((), choice, Servo(), blinding)
-    shown = [(one.title, one.listens, one.withheld, one.shows_force) for one in outlets.statuses()]
-    described = outlets.described
+    status_rows = [(status.title, status.listens, status.withheld, status.shows_force) for status in outlets.statuses()]
+    descriptions = outlets.described
     outlets.close()
-    assert not [one for one in threading.enumerate() if one.name.startswith("outlet")]
-    assert (list(described) == ["LSL samples"]) == streams
+    assert not [
+        thread_of_outlet for thread_of_outlet in threading.enumerate() if thread_of_outlet.name.startswith("outlet")
+    ]
+    assert (list(descriptions) == ["LSL samples"]) == streams
     if streams or withheld:
-        assert shown == [("LSL samples", None if withheld else False, withheld, streams and blinding == "double")]
+        assert status_rows == [("LSL samples", None if withheld else False, withheld, streams and blinding == "double")]
     else:
-        assert shown == []
+        assert status_rows == []
 
 
-def test_an_unexpected_error_of_a_driver_stops_no_session(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unexpected_driver_error_does_not_stop_the_session(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(_place: str, _now_ns: Any) -> Any:
         raise RuntimeError("could not create the stream outlet")
 

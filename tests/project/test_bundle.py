@@ -22,14 +22,14 @@ PACKAGING = Path(__file__).resolve().parents[2] / "packaging"
 def started(*words: str, code: int = 0, send: bytes = b"", **variables: str) -> str:
     environment = os.environ | variables | {"PYTHONPATH": str(PACKAGING.parent)}
     command = [sys.executable, str(PACKAGING / "start.py"), *words]
-    done = subprocess.run(command, env=environment, input=send, capture_output=True, check=False, timeout=120)
-    assert done.returncode == code, done.stderr
-    return done.stdout.decode()
+    process = subprocess.run(command, env=environment, input=send, capture_output=True, check=False, timeout=120)
+    assert process.returncode == code, process.stderr
+    return process.stdout.decode()
 
 
 @pytest.fixture
 def bundle(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """The functions of packaging/bundle.py."""
+    """Return the functions of packaging/bundle.py."""
     monkeypatch.syspath_prepend(PACKAGING)
     return runpy.run_path(str(PACKAGING / "bundle.py"))
 
@@ -82,24 +82,24 @@ def test_with_the_newest_libraries_it_opens_a_sessions_windows_in_an_empty_root(
 
 @pytest.fixture
 def recipe(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, qapp: object) -> dict[str, Any]:
-    """What the recipe asks PyInstaller for: the words of Analysis and EXE."""
+    """Return the options that the recipe passes to PyInstaller's Analysis and EXE."""
     hooks = types.ModuleType("PyInstaller.utils.hooks")
     hooks.copy_metadata = lambda _name: []  # type: ignore[attr-defined]
     for name in ("PyInstaller", "PyInstaller.utils"):
         monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
     monkeypatch.setitem(sys.modules, hooks.__name__, hooks)
-    asked: dict[str, Any] = {}
+    requests: dict[str, Any] = {}
 
     def make(*_words: object, **options: Any) -> Any:
-        asked.update(options)
-        return types.SimpleNamespace(pure=[], scripts=[], binaries=[], datas=asked["datas"])
+        requests.update(options)
+        return types.SimpleNamespace(pure=[], scripts=[], binaries=[], datas=requests["datas"])
 
-    given = {"SPECPATH": str(PACKAGING), "workpath": str(tmp_path)}
+    globals_given = {"SPECPATH": str(PACKAGING), "workpath": str(tmp_path)}
     runpy.run_path(
         str(PACKAGING / "liquid-study.spec"),
-        init_globals=given | dict.fromkeys(("Analysis", "PYZ", "EXE", "COLLECT"), make),
+        init_globals=globals_given | dict.fromkeys(("Analysis", "PYZ", "EXE", "COLLECT"), make),
     )
-    return asked
+    return requests
 
 
 def test_the_recipe_contains_the_pages_of_help(recipe: dict[str, Any]) -> None:

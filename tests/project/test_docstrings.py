@@ -52,9 +52,9 @@ def modules(package: str) -> Iterator[ModuleType]:
     """Return the public modules of a package and of those below it."""
     top = importlib.import_module(package)
     yield top
-    for found in pkgutil.walk_packages(top.__path__, package + "."):
-        if not any(part.startswith("_") for part in found.name.split(".")):
-            yield importlib.import_module(found.name)
+    for module in pkgutil.walk_packages(top.__path__, package + "."):
+        if not any(part.startswith("_") for part in module.name.split(".")):
+            yield importlib.import_module(module.name)
 
 
 def is_public(name: str, value: Any) -> bool:
@@ -100,9 +100,9 @@ def faults(name: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_docstrings_are_numpydocs(package: str) -> None:
-    asked = list(names(f"study_app.{package}"))
-    assert len(asked) > 20
-    assert [fault for name in asked for fault in faults(name)] == []
+    public_names = list(names(f"study_app.{package}"))
+    assert len(public_names) > 20
+    assert [fault for name in public_names for fault in faults(name)] == []
 
 
 @needs_servo
@@ -113,7 +113,7 @@ def test_examples_run(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     module = importlib.import_module(name.rpartition(".")[0])
     (example,) = doctest.DocTestFinder(recurse=False).find(vars(module)[name.rpartition(".")[2]], name)
     example.globs.update(vars(module))
-    told: list[str] = []
-    result = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(example, out=told.append)
+    output: list[str] = []
+    result = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(example, out=output.append)
     assert result.attempted > 1
-    assert result.failed == 0, "".join(told)
+    assert result.failed == 0, "".join(output)

@@ -43,7 +43,7 @@ def test_modules_that_packages_describe_exist() -> None:
 
 
 def test_benchmarks_import_names_that_exist() -> None:
-    """Nothing else notices a renamed function there: the check does not run benchmarks."""
+    """No other test detects a renamed function there, since the check does not run benchmarks."""
     missing = []
     for path in (ROOT.parent / "tests" / "benchmarks").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_bytes())):
@@ -70,8 +70,8 @@ def _programs_in_strings(path: Path) -> Iterator[ast.Module]:
                 yield ast.parse(textwrap.dedent(text))
 
 
-def test_programs_in_strings_call_what_exists() -> None:
-    """Nothing else notices a changed signature there before the program runs."""
+def test_programs_in_strings_call_existing_functions() -> None:
+    """No other test detects a changed signature there before the program runs."""
     faults, calls = [], 0
     for path in (path for folder in ("packaging", "tests", "tools") for path in (ROOT.parent / folder).rglob("*.py")):
         for program in _programs_in_strings(path):
@@ -85,12 +85,12 @@ def test_programs_in_strings_call_what_exists() -> None:
                             faults.append(f"{path.name}: {error}")
             for call in (node for node in ast.walk(program) if isinstance(node, ast.Call)):
                 function = names.get(getattr(call.func, "id", ""))
-                given = {keyword.arg: None for keyword in call.keywords}
-                if function is None or None in given or any(isinstance(node, ast.Starred) for node in call.args):
+                keywords = {keyword.arg: None for keyword in call.keywords}
+                if function is None or None in keywords or any(isinstance(node, ast.Starred) for node in call.args):
                     continue
                 calls += 1
                 try:
-                    inspect.signature(function).bind(*call.args, **given)
+                    inspect.signature(function).bind(*call.args, **keywords)
                 except TypeError as error:
                     faults.append(f"{path.name}: {ast.unparse(call)}: {error}")
     assert faults == []
@@ -121,5 +121,5 @@ def test_reading_a_protocol_loads_neither_compiler_nor_qt():
         "study_app.protocol.load.load('rek2024').scene_for('water')\n"
         f"print([name for name in {HEAVY} if name in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert process.stdout.strip() == "[]"

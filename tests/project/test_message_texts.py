@@ -16,14 +16,14 @@ FORMATTERS = {"PydanticCustomError", "StrMethodFormatter", "TextColumn", "format
 """What puts values into a text of its own function."""
 
 
-def unformatted(source: str) -> Iterator[tuple[int, str]]:
+def unformatted_strings(source: str) -> Iterator[tuple[int, str]]:
     """Yield line and text of each string that names a variable of its function in braces, and is no f-string."""
     for function in ast.walk(ast.parse(source)):
         if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
             continue
         nodes = [node for statement in function.body for node in ast.walk(statement)]
         called = [node.func for node in nodes if isinstance(node, ast.Call)]
-        if FORMATTERS & {getattr(one, "attr", getattr(one, "id", "")) for one in called}:
+        if FORMATTERS & {getattr(function_node, "attr", getattr(function_node, "id", "")) for function_node in called}:
             continue
         known = {node.arg for node in ast.walk(function.args) if isinstance(node, ast.arg)}
         known |= {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
@@ -36,16 +36,16 @@ def unformatted(source: str) -> Iterator[tuple[int, str]]:
 
 def test_no_text_prints_the_name_of_a_variable() -> None:
     folder = Path(study_app.__file__).parent
-    found = {
+    unformatted_texts = {
         f"{path.relative_to(folder)}:{line}": text
         for path in sorted(folder.rglob("*.py"))
-        for line, text in unformatted(path.read_text(encoding="utf-8"))
+        for line, text in unformatted_strings(path.read_text(encoding="utf-8"))
     }
-    assert found == {}
+    assert unformatted_texts == {}
 
 
 def test_each_logged_text_has_a_place_for_each_of_its_values() -> None:
-    found = []
+    wrong_calls = []
     for path in sorted(Path(study_app.__file__).parent.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             match node:
@@ -58,8 +58,8 @@ def test_each_logged_text_has_a_place_for_each_of_its_values() -> None:
                 case _:
                     continue
             if not whole:
-                found.append((path.name, node.lineno))
-    assert found == []
+                wrong_calls.append((path.name, node.lineno))
+    assert wrong_calls == []
 
 
 def test_no_part_of_a_text_stands_alone() -> None:

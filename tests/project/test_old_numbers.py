@@ -36,7 +36,7 @@ PAGE = """# Page
 CHANGELOG = "## [Unreleased]\n\n## [0.3.0] - 2026-11-23\n\n## [0.2.0] - 2026-11-21\n"
 
 
-def test_sections_older_than_their_code_and_without_a_date_are_told_apart(tmp_path: Path) -> None:
+def test_outdated_and_undated_sections_are_distinguished(tmp_path: Path) -> None:
     files = {
         "CHANGELOG.md": CHANGELOG,
         "docs/page.md": PAGE,

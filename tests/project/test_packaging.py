@@ -1,4 +1,4 @@
-"""What is shipped: the wheel works far from the checkout, the README's commands are the ones the check runs."""
+"""The shipped files: the wheel works outside the checkout, and the check runs the README's commands."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the package as its wheel holds it."""
+    """Return a folder with the package as in its wheel."""
     folder = tmp_path_factory.mktemp("wheel")
     pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
     build = [*pip, "wheel", str(ROOT), "--no-deps", "--no-build-isolation", "--wheel-dir", str(folder)]

@@ -98,14 +98,14 @@ def text_without_form(call: ast.Call) -> bool:
     """Return whether a call reads or writes text in the system's own encoding, or writes the system's line ends."""
     if not isinstance(call.func, ast.Attribute):
         return False
-    name, given = call.func.attr, {keyword.arg for keyword in call.keywords}
+    name, keywords = call.func.attr, {keyword.arg for keyword in call.keywords}
     if name == "open":
         mode = call.args[0].value if call.args and isinstance(call.args[0], ast.Constant) else ""
         is_text = isinstance(mode, str) and re.fullmatch(r"[rwax]\+?t?", mode) is not None
-        return is_text and not {"encoding", "newline"} <= given
+        return is_text and not {"encoding", "newline"} <= keywords
     if name == "write_text" and len(call.args) == 1:  # with several arguments it is another function
-        return not {"encoding", "newline"} <= given
-    return name == "read_text" and not call.args and "encoding" not in given
+        return not {"encoding", "newline"} <= keywords
+    return name == "read_text" and not call.args and "encoding" not in keywords
 
 
 def test_text_files_have_one_encoding_and_one_line_end_on_every_system() -> None:
@@ -143,13 +143,13 @@ def test_a_clone_on_windows_has_the_same_bytes(tmp_path: Path) -> None:
     """Git for Windows converts line ends unless the repository forbids it; the hash of a study would differ."""
     if shutil.which("git") is None:
         pytest.skip("git is not installed")
-    made, clone = tmp_path / "made", tmp_path / "clone"
-    made.mkdir()
+    repository, clone = tmp_path / "made", tmp_path / "clone"
+    repository.mkdir()
     names = (".gitattributes", "protocols/demo.toml", "study_app/haptics/kernels/tick.py", "docs/pictures/tank.jpg")
     for name in names:
-        (made / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / name, made / name)
+        (repository / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, repository / name)
     person = ("-c", "user.name=P", "-c", "user.email=p@example.org", "-c", "core.autocrlf=true")
     for words in (("init", "-q", "."), ("add", "."), ("commit", "-q", "-m", "files"), ("clone", "-q", ".", str(clone))):
-        subprocess.run(["git", *person, *words], cwd=made, check=True, capture_output=True)
+        subprocess.run(["git", *person, *words], cwd=repository, check=True, capture_output=True)
     assert [name for name in names if (clone / name).read_bytes() != (ROOT / name).read_bytes()] == []

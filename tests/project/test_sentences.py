@@ -130,4 +130,4 @@ def test_the_patterns_are_found(text: str, name: str) -> None:
 
 
 def test_no_sentence_has_a_pattern_that_readers_stumble_over() -> None:
-    assert {f"{place}: {text[:200]}": found for place, text in sentences() if (found := found_in(text))} == {}
+    assert {f"{place}: {text[:200]}": patterns for place, text in sentences() if (patterns := found_in(text))} == {}

@@ -70,7 +70,7 @@ def called(decorator: ast.expr) -> str:
 
 def modules_of(sources: Mapping[str, str]) -> dict[str, Module]:
     """Return the modules, by their names, from their sources by path."""
-    found = {}
+    modules = {}
     for path, source in sources.items():
         name = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
         module = Module(name, path, ast.parse(source))
@@ -84,8 +84,8 @@ def modules_of(sources: Mapping[str, str]) -> dict[str, Module]:
         for node in ast.walk(module.tree):
             if isinstance(node, ast.Assign) and (meant := module.class_of(node.value)) is not None:
                 module.meanings |= {each.id: meant for each in node.targets if isinstance(each, ast.Name)}
-        found[name] = module
-    return found
+        modules[name] = module
+    return modules
 
 
 def records_of(modules: Mapping[str, Module]) -> dict[Name, Record]:
@@ -267,7 +267,7 @@ def compiled() -> tuple[float, float, float]: ...
         ("def parts() -> tuple[NDArray[A], NDArray[A], NDArray[A]]: ...", "parts returns"),
     ],
 )
-def test_each_rule_finds_what_breaks_it_in_another_module(faulty: str, what: str) -> None:
+def test_each_rule_finds_its_violation_in_another_module(faulty: str, what: str) -> None:
     imports = "from dataclasses import dataclass\nfrom app import shapes\nfrom app.shapes import Quartiles\n"
     (fault,) = faults_of({"app/shapes.py": SHAPES, "app/faulty.py": imports + faulty})
     place, _, said = fault.partition(": ")
@@ -275,7 +275,7 @@ def test_each_rule_finds_what_breaks_it_in_another_module(faulty: str, what: str
     assert said.startswith(what)
 
 
-def test_what_keeps_to_the_rules_is_no_fault() -> None:
+def test_conforming_code_has_no_fault() -> None:
     uses = (
         "from app.shapes import Curve, Labels, Pair, Quartiles, Sphere",
         "Curve(1.0, 2.0, middle=1.5)",

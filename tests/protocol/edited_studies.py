@@ -40,7 +40,7 @@ def split(said: Iterable[str]) -> tuple[list[str], list[str]]:
 
 
 class Case(NamedTuple):
-    """A study with edits, and the asserted and the recorded lines that are said of it."""
+    """A study with edits, and the asserted and the recorded lines about it."""
 
     study: str
     name: str
@@ -50,7 +50,7 @@ class Case(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Return the edited text; each replaced run of lines is there once."""
+        """Return the edited text; each replaced run of lines must occur exactly once."""
         text = "\n" + text_of(self.study)
         for old, new in self.edits:
             assert text.count(old) == 1, f"{self.name}: {old!r} is there {text.count(old)} times"
@@ -66,7 +66,7 @@ def text_of(study: str) -> str:
 
 
 def said_of(text: str, study: str) -> list[str]:
-    """Return the problems of a text, or what describing it says beyond the study without edits."""
+    """Return the problems of a text, or the lines of its description that the unedited study lacks."""
     try:
         protocol = parse(text.encode(), "study.toml")
     except ProtocolError as error:
@@ -106,8 +106,8 @@ def regenerate(file: Path) -> None:
     for case in cases:
         edits = "...\n".join(_signed("-", old) + _signed("+", new) for old, new in case.edits)
         _, recorded = split(said_of(case.text, case.study))
-        said = "".join([*(f"! {line}\n" for line in case.asserted), *(f"> {line}\n" for line in recorded)])
-        parts.append(f"=== {case.name}\n{edits}{said}")
+        message = "".join([*(f"! {line}\n" for line in case.asserted), *(f"> {line}\n" for line in recorded)])
+        parts.append(f"=== {case.name}\n{edits}{message}")
     file.write_text("\n".join(parts), encoding="utf-8", newline="\n")
 
 

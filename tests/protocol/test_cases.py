@@ -39,7 +39,7 @@ def recorded_anew(request: pytest.FixtureRequest) -> None:
         for case in cases_of(file)
     ],
 )
-def test_check_says_what_the_case_states(case: Case, recorded_anew: None) -> None:
+def test_check_prints_the_stated_lines(case: Case, recorded_anew: None) -> None:
     asserted, recorded = split(said_of(case.text, case.study))
     assert asserted == list(case.asserted)
     assert recorded == list(case.recorded)
@@ -53,9 +53,9 @@ def test_a_study_is_described_as_before(name: str) -> None:
 
 
 def problems_of(text: str | bytes) -> tuple[str, ...]:
-    with pytest.raises(ProtocolError) as refused:
+    with pytest.raises(ProtocolError) as error:
         parse(text if isinstance(text, bytes) else text.encode(), "file.toml")
-    return tuple(map(str, refused.value.problems))
+    return tuple(map(str, error.value.problems))
 
 
 def test_a_viscosity_that_a_constant_coefficient_ignores_is_named_with_both_forces() -> None:
@@ -66,7 +66,7 @@ def test_a_viscosity_that_a_constant_coefficient_ignores_is_named_with_both_forc
         text_of("session").replace("density_kg_m3 = 1450.3", thick).replace("[device]", f"{scene}[device]", 1).encode(),
         "x",
     )
-    (warning,) = (said for said in liquid_warnings(protocol) if said.startswith("thick has a viscosity"))
+    (warning,) = (warning for warning in liquid_warnings(protocol) if warning.startswith("thick has a viscosity"))
     constant_n, true_n, error_n = map(
         float, re.search(r"is ([\d.]+) instead of ([\d.]+) N, an error of ([\d.]+) N", warning).groups()
     )
@@ -93,7 +93,7 @@ def test_broken_toml_gives_line_and_column(old: str, new: str, line: int, words:
     assert words in problem
 
 
-def test_windows_line_ends_change_nothing() -> None:
+def test_windows_line_endings_do_not_change_the_protocol() -> None:
     text = SOUND.replace("rate_hz = 1000", "rate = 1000")
     assert problems_of(text.replace("\n", "\r\n")) == problems_of(text)
 
@@ -111,7 +111,7 @@ def test_windows_line_ends_change_nothing() -> None:
     ],
     ids=lambda value: value[:30],
 )
-def test_what_is_too_long_is_a_problem_in_a_short_line(text: str, said: str) -> None:
+def test_a_too_long_text_is_a_problem_in_a_short_line(text: str, said: str) -> None:
     problems = problems_of(text)
     assert any(said in problem for problem in problems), problems
     assert max(map(len, problems)) < 500
@@ -122,8 +122,8 @@ def test_what_is_too_long_is_a_problem_in_a_short_line(text: str, said: str) -> 
     ["\u05e2\u200e 1\u200f", "\u0645\u06cc\u200c\u062e", "\U0001f469\u200d\U0001f52c", "Ł. Rek", "a\nb", "ß – “q” … ²"],
 )
 def test_a_title_in_any_script_is_a_title(text: str) -> None:
-    written = SOUND.replace('title = { en = "Small"', f'title = {{ en = """{text}"""')
-    assert parse(written.encode(), "file.toml").study.title
+    text_with_title = SOUND.replace('title = { en = "Small"', f'title = {{ en = """{text}"""')
+    assert parse(text_with_title.encode(), "file.toml").study.title
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_the_command_prints_problems_and_judges_levels_for_a_delay(
 
 
 @pytest.mark.parametrize("name", ["rek2024", "demo"])
-def test_the_thesis_studies_warn_only_of_what_the_thesis_does_not_state(name: str) -> None:
+def test_the_thesis_studies_warn_only_of_unstated_values(name: str) -> None:
     _, _, warnings = describe(load(name)).partition("Warnings\n")
     places = [line.split()[0] for line in warnings.splitlines()]
     assert places == {"rek2024": ["analysis.participants", "tasks.reach:"], "demo": []}[name]

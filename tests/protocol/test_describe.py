@@ -27,9 +27,9 @@ source = "Jones et al. 1997"
 
 
 def test_published_values_are_not_in_the_receipt() -> None:
-    shown = without_conditions(study(more=PLANNED))
-    assert "0.1937" not in json.dumps(shown)
-    assert shown["analysis"]["participants"] == 20
+    published = without_conditions(study(more=PLANNED))
+    assert "0.1937" not in json.dumps(published)
+    assert published["analysis"]["participants"] == 20
 
 
 def test_omitted_keys_of_a_plan_are_not_written() -> None:
@@ -49,7 +49,7 @@ def test_omitted_keys_of_a_plan_are_not_written() -> None:
         ),
     ],
 )
-def test_the_kind_of_a_question_is_told_unless_all_are_statements(kind: str, rows: str) -> None:
+def test_the_kind_of_a_question_is_described_unless_all_are_statements(kind: str, rows: str) -> None:
     text = text_of("sound").replace('id = "cold"', f'id = "cold"\n{kind}')
     assert rows.replace("|", "\n") in describe(parse(text.encode(), "file.toml"))
 
@@ -106,6 +106,18 @@ SHUFFLED = 'order = "shuffled"\nquestionnaire = "feel"'
                 "Comparisons viscosity_pa_s 1.2 to 4.5 Pa·s",
             },
         ),
+        (
+            "levels",
+            {
+                'design = "2ifc"': 'design = "pair"\nuntil = { right = 8, of = 10 }',
+                "[methods.few]": '[designs.pair]\nkind = "2ifc"\nfeedback = "always"\n[methods.few]',
+            },
+            {
+                "Ends early as soon as 8 of the last 10 answers are correct; if this never happens, the session "
+                "continues after the last trial",
+                "Feedback after every trial",
+            },
+        ),
         (  # the pace is 2π · 20 mm · 1 Hz
             "matching",
             {"levels = [2, 18]": "levels = [3, 15]"},
@@ -157,5 +169,5 @@ def test_each_row_states_its_own_value(study: str, edits: dict[str, str], lines:
     for old, new in edits.items():
         assert text.count(old) == 1, old
         text = text.replace(old, new)
-    described = describe(parse(text.encode(), "file.toml"))
-    assert lines - {" ".join(line.split()) for line in described.splitlines()} == set()
+    description = describe(parse(text.encode(), "file.toml"))
+    assert lines - {" ".join(line.split()) for line in description.splitlines()} == set()

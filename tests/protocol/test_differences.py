@@ -20,25 +20,25 @@ def edited(*edits: tuple[str, str]) -> Protocol:
     return parse(text.encode(), "small")
 
 
-def kept(protocol: Protocol) -> dict[str, Any]:
-    """Return the protocol as it comes back from a receipt on disk."""
+def receipt_protocol(protocol: Protocol) -> dict[str, Any]:
+    """Return the protocol as read back from a receipt."""
     return json.loads(json.dumps(without_conditions(protocol)))  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize("protocol", [SMALL, load("rek2024"), load("demo")])
 def test_a_protocol_does_not_differ_from_itself_nor_from_its_receipt(protocol: Protocol):
     assert differences(protocol, protocol) == ()
-    assert differences(kept(protocol), protocol) == ()
-    assert differences(protocol, kept(protocol)) == ()
-    assert differences(kept(protocol), kept(protocol)) == ()
+    assert differences(receipt_protocol(protocol), protocol) == ()
+    assert differences(protocol, receipt_protocol(protocol)) == ()
+    assert differences(receipt_protocol(protocol), receipt_protocol(protocol)) == ()
 
 
-def test_a_receipt_that_does_not_say_what_a_block_compares_differs_in_nothing():
-    earlier = kept(SMALL)
+def test_a_receipt_without_comparisons_has_no_differences():
+    earlier = receipt_protocol(SMALL)
     for block in earlier["blocks"].values():
         del block["compares"]
     assert differences(earlier, SMALL) == ()
-    assert differences(earlier, kept(SMALL)) == ()
+    assert differences(earlier, receipt_protocol(SMALL)) == ()
 
 
 @pytest.mark.parametrize(
@@ -70,9 +70,9 @@ def test_a_receipt_that_does_not_say_what_a_block_compares_differs_in_nothing():
         ]),
     ],
 )  # fmt: skip
-def test_what_differs_is_named_with_its_place(edits: list[tuple[str, str]], expected: list[str]):
+def test_differences_are_named_with_their_place(edits: list[tuple[str, str]], expected: list[str]):
     assert list(differences(SMALL, edited(*edits))) == expected
-    assert list(differences(kept(SMALL), kept(edited(*edits)))) == expected
+    assert list(differences(receipt_protocol(SMALL), receipt_protocol(edited(*edits)))) == expected
 
 
 def test_items_in_another_order_are_said_to_be_just_that():
@@ -96,28 +96,28 @@ SECRET = SOUND.replace("1400", "1013.7").replace("is_thick", "spinach").replace(
         ("[liquids.other]", "[liquids.more]\ndensity_kg_m3 = 137\n[liquids.other]"),
     ],
 )
-def test_of_conditions_nothing_is_told_but_that_they_differ(old: str, new: str):
+def test_differing_conditions_are_reported_without_details(old: str, new: str):
     assert SECRET.count(old) == 1
     before, after = (parse(text.encode(), "secret") for text in (SECRET, SECRET.replace(old, new)))
     assert differences(before, after) == (CONDITIONS_DIFFER,)
-    assert differences(kept(before), after) == ()
+    assert differences(receipt_protocol(before), after) == ()
 
 
 def test_conditions_of_an_opened_key_are_compared():
     tables = SMALL.model_dump(mode="json", include={"conditions", "liquids"})
-    opened = {**kept(SMALL), **tables}
-    assert differences(opened, SMALL) == ()
-    assert differences(opened, edited(("delay_ms = 120", "delay_ms = 121"))) == (CONDITIONS_DIFFER,)
+    open_study = {**receipt_protocol(SMALL), **tables}
+    assert differences(open_study, SMALL) == ()
+    assert differences(open_study, edited(("delay_ms = 120", "delay_ms = 121"))) == (CONDITIONS_DIFFER,)
 
 
-def test_a_condition_more_is_told_by_its_code():
+def test_an_added_condition_is_reported_by_its_code():
     more = edited(('["is_thin", "is_thick"]', '["is_thin", "is_thick", "on_time"]'))
     assert differences(SMALL, more) == ("blocks.feel.codes: previously 2 entries, now 3", CONDITIONS_DIFFER)
-    assert differences(kept(SMALL), more) == ("blocks.feel.codes: previously 2 entries, now 3",)
+    assert differences(receipt_protocol(SMALL), more) == ("blocks.feel.codes: previously 2 entries, now 3",)
 
 
-def test_keys_that_an_older_receipt_does_not_know_are_no_difference_while_unused():
-    older = kept(SMALL)
+def test_unused_keys_missing_from_an_older_receipt_are_not_differences():
+    older = receipt_protocol(SMALL)
     for block in older["blocks"].values():
         for key in ("max_repeats", "min_distance", "break_every", "break_page"):
             del block[key]

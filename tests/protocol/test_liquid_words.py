@@ -11,7 +11,7 @@ from study_app.haptics.model.scene import Liquid
 from study_app.lab.presets import available_liquids
 from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load
-from study_app.protocol.quantities import liquid_words
+from study_app.protocol.quantities import liquid_text
 
 UNITS = (
     ("_kg_m3", " kg/m³"), ("_pa_sn", " Pa·sⁿ"), ("_pa_s", " Pa·s"), ("_pa", " Pa"), ("_per_s", " 1/s"),
@@ -63,7 +63,7 @@ def test_each_parameter_of_a_shipped_liquid_is_named_with_its_unit(source: str, 
     if liquid.drag.damping_nspm is not None:
         values = [value for value in values if "kg/m³" not in value]  # a damper's density has no effect
     assert values
-    assert [value for value in values if value not in f" {liquid_words(liquid.model_dump(mode='json'))}"] == []
+    assert [value for value in values if value not in f" {liquid_text(liquid.model_dump(mode='json'))}"] == []
     (row,) = (line for line in described_liquids(source) if line.split()[0] == name)
     assert [value for value in values if value not in row] == []
 
@@ -90,13 +90,13 @@ TABLES: dict[str, dict[str, dict[str, tuple[float, float]]]] = {
 @pytest.mark.parametrize(("effect", "kind"), [(effect, kind) for effect, kinds in TABLES.items() for kind in kinds])
 def test_drawn_parameters_are_named_with_their_units(effect: str, kind: str, automatic: bool) -> None:
     rng = np.random.default_rng([len(effect), len(kind)])
-    drawn = {name: round(float(rng.uniform(*ends)), 3) for name, ends in TABLES[effect][kind].items()}
-    table: dict[str, Any] = {effect: drawn | ({"kind": kind} if kind else {})}
-    named = [effect] if effect == "non_newtonian" else ["drag", *([] if effect == "region" else [effect])]
+    parameters = {name: round(float(rng.uniform(*ends)), 3) for name, ends in TABLES[effect][kind].items()}
+    table: dict[str, Any] = {effect: parameters | ({"kind": kind} if kind else {})}
+    effects = [effect] if effect == "non_newtonian" else ["drag", *([] if effect == "region" else [effect])]
     if effect == "history":
         table["viscosity_pa_s"] = 0.75
-    liquid = Liquid(id="made", density_kg_m3=1234, effects="auto" if automatic else named, **table)
-    words = f" {liquid_words(liquid.model_dump(mode='json'))}"
+    liquid = Liquid(id="made", density_kg_m3=1234, effects="auto" if automatic else effects, **table)
+    words = f" {liquid_text(liquid.model_dump(mode='json'))}"
     assert [value for value in written_values(table) if value not in words] == []
 
 
@@ -126,4 +126,4 @@ def test_parameters_of_effects_that_do_not_act_are_left_out(changed: dict[str, A
         "wake": {"length": 3.0, "scaling": 5.0, "exponent": 0.7},
         "effects": ["drag", "wake", "added_mass"],
     }
-    assert liquid_words(liquid | changed) == text
+    assert liquid_text(liquid | changed) == text

@@ -51,10 +51,10 @@ def test_a_missing_protocol_is_refused_with_a_hint(
     name: str, message: str, hint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ProtocolError) as caught:
+    with pytest.raises(ProtocolError) as error:
         load(name)
-    assert str(caught.value).startswith(f"{name}: 1 problem\n  file: {message} ({hint}")
-    (problem,) = caught.value.problems
+    assert str(error.value).startswith(f"{name}: 1 problem\n  file: {message} ({hint}")
+    (problem,) = error.value.problems
     assert (problem.place, problem.message, problem.hint[: len(hint)]) == ("file", message, hint)
 
 
@@ -66,11 +66,9 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "read_bytes", refuse)
-    with pytest.raises(ProtocolError) as caught:
+    with pytest.raises(ProtocolError) as error:
         load(path)
-    assert caught.value.problems == (
-        Problem("file", "cannot be read: Permission denied", hint="check its permissions"),
-    )
+    assert error.value.problems == (Problem("file", "cannot be read: Permission denied", hint="check its permissions"),)
 
 
 def test_a_scene_is_one_liquid_of_a_protocol():
@@ -80,7 +78,7 @@ def test_a_scene_is_one_liquid_of_a_protocol():
     assert scene == load("rek2024").scene_for("honey")
 
 
-def test_a_scene_file_needs_no_study(tmp_path: Path):
+def test_a_scene_file_is_loaded_without_a_study(tmp_path: Path):
     path = tmp_path / "scene.toml"
     path.write_text(
         "format = 2\n[scene]\nscale = 3\nrate_hz = 500\n[liquids.tar]\ndensity_kg_m3 = 1153\n",
@@ -96,9 +94,9 @@ def test_a_scene_file_needs_no_study(tmp_path: Path):
 def test_problems_of_a_scene_file_are_its_own(tmp_path: Path):
     path = tmp_path / "scene.toml"
     path.write_text("format = 2\n[scene]\nscael = 3\n\n[liquids.tar]\ndensity = 1153\n", encoding="utf-8", newline="\n")
-    with pytest.raises(ProtocolError) as caught:
+    with pytest.raises(ProtocolError) as error:
         load_scene(path, "tar")
-    assert [(problem.line, problem.place) for problem in caught.value.problems] == [
+    assert [(problem.line, problem.place) for problem in error.value.problems] == [
         (3, "scene.scael"),
         (5, "liquids.tar.density_kg_m3"),
         (6, "liquids.tar.density"),
@@ -106,9 +104,9 @@ def test_problems_of_a_scene_file_are_its_own(tmp_path: Path):
 
 
 def test_an_unknown_liquid_is_named_with_the_nearest():
-    with pytest.raises(ProtocolError, match='there is no liquid "hony"') as caught:
+    with pytest.raises(ProtocolError, match='there is no liquid "hony"') as error:
         load_scene("rek2024", "hony")
-    assert 'did you mean "honey"?' in str(caught.value)
+    assert 'did you mean "honey"?' in str(error.value)
 
 
 LINES = EVERY_ORDER.splitlines()
@@ -121,7 +119,7 @@ VALUES = ["3", "-1.5", "true", '""', '"thin"', "[]", "[1, [2]]", "{}", "{ en = 1
         st.tuples(st.integers(0, len(LINES) - 1), st.sampled_from(["drop", "double", *VALUES])), min_size=1, max_size=5
     )
 )
-def test_whatever_is_changed_gives_a_protocol_or_a_list_of_problems(changes: list[tuple[int, str]]):
+def test_any_change_gives_a_protocol_or_a_list_of_problems(changes: list[tuple[int, str]]):
     lines = list(LINES)
     for number, change in changes:
         if change == "drop":
@@ -156,7 +154,7 @@ def test_a_liquid_file_is_found_however_its_key_is_written(text: str) -> None:
     assert StudySource.split(source.content) == source == (text.encode(), {"a.toml": "# a.toml"}, {})
 
 
-def test_the_word_in_a_comment_names_no_file() -> None:
+def test_the_word_in_a_comment_is_not_a_file_name() -> None:
     text = b"# This file has no liquid file.\n[liquids.thick]\ndensity_kg_m3 = 1000\n"
     assert StudySource(text).with_liquids(lambda _name: "lost").content == text
 
@@ -164,13 +162,13 @@ def test_the_word_in_a_comment_names_no_file() -> None:
 DAMPER = '[liquids.damper]\ndrag = { law = "linear", damping_nspm = 12 }\n'
 
 
-def written(path: Path, text: str) -> Path:
+def write_study(path: Path, text: str) -> Path:
     path.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 
-def test_a_damper_needs_no_density(tmp_path: Path) -> None:
-    scene = load_scene(written(tmp_path / "damper.toml", f"format = 2\n{DAMPER}"), "damper")
+def test_a_damper_is_loaded_without_a_density(tmp_path: Path) -> None:
+    scene = load_scene(write_study(tmp_path / "damper.toml", f"format = 2\n{DAMPER}"), "damper")
     assert scene.liquids[0].drag == Drag(law="linear", damping_nspm=12)
     assert value_of(override_value(scene, "damping_nspm", "20"), "damping_nspm") == 20
     assert steady_force(scene).force_n == pytest.approx(1.2)
@@ -178,44 +176,44 @@ def test_a_damper_needs_no_density(tmp_path: Path) -> None:
 
 def test_the_estimator_of_a_scene_file_is_kalman_unless_it_states_one(tmp_path: Path) -> None:
     text = "format = 2\n[scene]\nscale = 3\n[liquids.water]\ndensity_kg_m3 = 1000\n"
-    assert load_scene(written(tmp_path / "water.toml", text), "water").velocity == Kalman()
-    named = text.replace("scale = 3", 'scale = 3\nvelocity = { kind = "raw" }')
-    assert load_scene(written(tmp_path / "water.toml", named), "water").velocity == Raw()
+    assert load_scene(write_study(tmp_path / "water.toml", text), "water").velocity == Kalman()
+    with_estimator = text.replace("scale = 3", 'scale = 3\nvelocity = { kind = "raw" }')
+    assert load_scene(write_study(tmp_path / "water.toml", with_estimator), "water").velocity == Raw()
 
 
 @pytest.mark.parametrize("kind", ["line", "foaw", "lead"])
-def test_an_estimator_that_left_is_refused_with_its_place_and_what_to_write(tmp_path: Path, kind: str) -> None:
+def test_a_removed_estimator_is_refused_with_its_place_and_replacement(tmp_path: Path, kind: str) -> None:
     liquid = f'[scene]\nvelocity = {{ kind = "{kind}" }}\n[liquids.water]\ndensity_kg_m3 = 1000\n'
-    with pytest.raises(ProtocolError, match=f'"{kind}" has been removed from the program') as refused:
-        load_scene(written(tmp_path / "water.toml", f"format = 2\n{liquid}"), "water")
-    (problem,) = refused.value.problems
+    with pytest.raises(ProtocolError, match=f'"{kind}" has been removed from the program') as error:
+        load_scene(write_study(tmp_path / "water.toml", f"format = 2\n{liquid}"), "water")
+    (problem,) = error.value.problems
     assert (problem.place, problem.line, problem.hint) == ("scene.velocity.kind", 3, 'write "ewma", "kalman" or "raw"')
 
 
 def test_the_density_counts_where_effects_are_chosen(tmp_path: Path) -> None:
     text = f'format = 2\n{DAMPER}effects = "auto"\n'
     with pytest.raises(ProtocolError, match="density_kg_m3: is missing"):
-        load_scene(written(tmp_path / "damper.toml", text), "damper")
-    scene = load_scene(written(tmp_path / "damper.toml", f"{text}density_kg_m3 = 1000\n"), "damper")
+        load_scene(write_study(tmp_path / "damper.toml", text), "damper")
+    scene = load_scene(write_study(tmp_path / "damper.toml", f"{text}density_kg_m3 = 1000\n"), "damper")
     assert resolve(scene).liquids[0].drag == Drag(law="linear", damping_nspm=12)
     assert "drag law: linear, as specified in the file" in "\n".join(describe_gate(scene))
 
 
 def test_a_scene_with_a_damper_is_read_as_it_was_written(tmp_path: Path) -> None:
     damper = Scene(liquids=(Liquid(id="damper", density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=3)),))
-    assert load_scene(written(tmp_path / "damper.toml", scene_text(damper)), "damper") == damper
+    assert load_scene(write_study(tmp_path / "damper.toml", scene_text(damper)), "damper") == damper
     assert "damping_nspm" not in scene_text(Scene(liquids=(Liquid(id="water", density_kg_m3=1000),)))
 
 
 def test_effects_that_accuracy_excludes_are_not_chosen(tmp_path: Path) -> None:
     liquid = '[liquids.honey]\ndensity_kg_m3 = 1420\nviscosity_pa_s = 10\neffects = "auto"\n[scene]\nscale = 3\n'
-    chosen = {}
+    effects_of = {}
     for without in ("[]", '["unsteady_drag"]'):
         text = f"format = 2\n{liquid}accuracy.without = {without}\n"
-        scene = load_scene(written(tmp_path / "honey.toml", text), "honey")
-        assert load_scene(written(tmp_path / "again.toml", scene_text(scene)), "honey") == scene
-        chosen[without] = resolve(scene).liquids[0].effects
-    assert chosen == {
+        scene = load_scene(write_study(tmp_path / "honey.toml", text), "honey")
+        assert load_scene(write_study(tmp_path / "again.toml", scene_text(scene)), "honey") == scene
+        effects_of[without] = resolve(scene).liquids[0].effects
+    assert effects_of == {
         "[]": ("buoyancy", "unsteady_drag"),
         '["unsteady_drag"]': ("drag", "buoyancy", "added_mass", "history"),
     }
@@ -224,14 +222,14 @@ def test_effects_that_accuracy_excludes_are_not_chosen(tmp_path: Path) -> None:
 @pytest.mark.parametrize("head", ["", "format = 1\n"])
 def test_a_scene_file_of_an_earlier_format_is_to_be_upgraded(tmp_path: Path, head: str) -> None:
     with pytest.raises(ProtocolError, match=r"format: is 1, .*run liquid-study upgrade FILE"):
-        load_scene(written(tmp_path / "water.toml", f"{head}[liquids.water]\ndensity_kg_m3 = 1000\n"), "water")
+        load_scene(write_study(tmp_path / "water.toml", f"{head}[liquids.water]\ndensity_kg_m3 = 1000\n"), "water")
 
 
 def test_a_scene_file_states_the_fade(tmp_path: Path) -> None:
     text = "[scene]\nfade_s = 0.3\n[liquids.water]\ndensity_kg_m3 = 1000\n"
-    scene = load_scene(written(tmp_path / "water.toml", f"format = 2\n{text}"), "water")
+    scene = load_scene(write_study(tmp_path / "water.toml", f"format = 2\n{text}"), "water")
     assert scene.fade_s == 0.3
-    assert load_scene(written(tmp_path / "again.toml", scene_text(scene)), "water") == scene
+    assert load_scene(write_study(tmp_path / "again.toml", scene_text(scene)), "water") == scene
     assert "fade_s" not in scene_text(override_value(scene, "fade_s", 0.05))
 
 

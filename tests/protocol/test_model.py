@@ -13,7 +13,7 @@ from study_app.haptics.model.ranges import Frozen
 from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.quantities import can_vary, quantity, quantity_words
+from study_app.protocol.quantities import can_vary, quantity, quantity_text
 from study_app.protocol.source.files import source_bytes
 from study_app.store.receipt import without_conditions
 from tests.protocol.sound import SOUND
@@ -67,7 +67,7 @@ def test_threads_that_use_a_model_first_build_its_validator_once(base: type[Base
 
     with ThreadPoolExecutor(THREADS) as threads:
         values = list(threads.map(validate, range(THREADS)))
-    assert [(type(one), one.value) for one in values] == [(Model, value) for value in range(THREADS)]
+    assert [(type(value), value.value) for value in values] == [(Model, value) for value in range(THREADS)]
     assert len(builders) == 1, "a second builder deletes the validator that others use"
 
 
@@ -97,8 +97,8 @@ def test_every_number_of_a_liquid_has_words(study: str) -> None:
     names = {name for condition in protocol.conditions for name in number_names(protocol.scene_for(condition))}
     assert len(names) >= 15
     for name in names - OF_THE_LOOP:
-        assert quantity_words(name)
-        assert "_" not in quantity_words(name)
+        assert quantity_text(name)
+        assert "_" not in quantity_text(name)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_every_number_of_a_liquid_has_words(study: str) -> None:
 def test_a_quantity_is_named_with_its_effect_and_varies_unless_it_holds_for_a_session(
     name: str, wording: str, varies: bool
 ) -> None:
-    assert (quantity_words(name), can_vary(name)) == (wording, varies)
+    assert (quantity_text(name), can_vary(name)) == (wording, varies)
 
 
 def test_unknown_quantity_is_refused() -> None:

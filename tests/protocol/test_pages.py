@@ -38,7 +38,7 @@ def test_examples_of_trials_are_studies_and_replace_parts_of_the_first() -> None
 
 
 def test_example_of_questions_is_a_study() -> None:
-    (example,) = (one for one in examples(QUESTIONS) if one.startswith("format = 2"))
+    (example,) = (example for example in examples(QUESTIONS) if example.startswith("format = 2"))
     study = parse(example.encode(), "example")
     assert list(study.forms) == ["about_you"]
     assert [item.kind_id for item in study.questionnaires["after"].items] == ["rating", "slider"]
@@ -47,7 +47,7 @@ def test_example_of_questions_is_a_study() -> None:
 def test_example_of_groups_gives_the_steps_that_it_names() -> None:
     (example,) = examples(GROUPS)
     study = grouped(("[pages.hello]", "[pages.consent]"), groups=example)
-    assert [(one.name, one.protocol.sequence) for one in variants(study)] == [
+    assert [(variant.name, variant.protocol.sequence) for variant in variants(study)] == [
         ("group thin_first", ("consent", "thin", "thick")),
         ("group thick_first, session 1", ("consent", "thick")),
         ("group thick_first, session 2", ("thin",)),

@@ -31,12 +31,12 @@ ACCEPTED = {
 
 
 def complaints(text: str, **keys: Any) -> list[str]:
-    """Return what an editor says of a protocol file."""
+    """Return the schema errors of a protocol file, as an editor reports them."""
     return [error.message for error in VALIDATOR.iter_errors(tomllib.loads(text) | keys)]
 
 
 @pytest.mark.parametrize("name", ACCEPTED)
-def test_the_schema_accepts_what_check_accepts(name: str) -> None:
+def test_the_schema_accepts_studies_that_check_accepts(name: str) -> None:
     assert complaints(ACCEPTED[name]) == []
 
 
@@ -66,10 +66,12 @@ def test_the_schema_knows_every_kind_of_design(kind: str) -> None:
         ("sound", "[conditions.is_thick]", "[conditions.isThick]"),
         ("sound", "radius_mm = 6\n", ""),
         ("sound", "format = 2", "format = 3"),
+        ("mixed", 'intro = "At the end."', ""),
+        ("mixed", 'intro = "How was it?"\nscale = "agreement"', 'intro = "How was it?"'),
         ("sound", 'id = "cold"', 'id = "cold"\nkind = "number"\nstep = 1'),
     ],
 )
-def test_the_schema_refuses_what_check_refuses(study: str, old: str, new: str) -> None:
+def test_the_schema_refuses_studies_that_check_refuses(study: str, old: str, new: str) -> None:
     assert complaints(text_of(study).replace(old, new)) != []
 
 
@@ -82,15 +84,17 @@ def test_an_editor_of_toml_accepts_shipped_studies_and_names_the_line_of_a_mista
     words = ["taplo", "lint", "--colors", "never", "--schema", (tmp_path / "schema.json").as_uri()]
 
     def lint() -> tuple[int, str]:
-        done = subprocess.run([*words, *map(str, tmp_path.glob("*.toml"))], capture_output=True, text=True, check=False)
-        return done.returncode, done.stderr
+        process = subprocess.run(
+            [*words, *map(str, tmp_path.glob("*.toml"))], capture_output=True, text=True, check=False
+        )
+        return process.returncode, process.stderr
 
     assert lint()[0] == 0
     wrong = text_of("demo").replace('order = "shuffled"', 'order = "shufled"')
     (tmp_path / "demo.toml").write_text(wrong, encoding="utf-8", newline="\n")
     line = wrong[: wrong.index('\norder = "shufled"')].count("\n") + 2
-    code, said = lint()
-    assert (code, f"demo.toml:{line}:9" in said) == (1, True)
+    code, output = lint()
+    assert (code, f"demo.toml:{line}:9" in output) == (1, True)
 
 
 def test_every_key_is_described():

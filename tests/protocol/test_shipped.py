@@ -19,7 +19,7 @@ PROTOCOLS = Path(__file__).parents[2] / "protocols"
 NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
 
 
-def test_what_ships_is_listed():
+def test_shipped_studies_are_the_tracked_files():
     tracked = subprocess.run(["git", "ls-files", "*.toml"], cwd=PROTOCOLS, capture_output=True, text=True, check=False)
     assert tuple(shipped()) == tuple(sorted(Path(name).stem for name in tracked.stdout.split()) or NAMES)
 
@@ -37,7 +37,7 @@ def test_a_study_made_in_a_checkout_does_not_ship(tmp_path: Path, monkeypatch: p
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_ships_is_sound_and_named_like_its_file(name: str):
+def test_a_shipped_study_is_sound_and_named_like_its_file(name: str):
     protocol = load(PROTOCOLS / f"{name}.toml")
     assert protocol.study.name == name.replace("_", "")
     steps = build_schedule(protocol, "P001", 1).steps
@@ -50,15 +50,15 @@ def test_what_ships_is_sound_and_named_like_its_file(name: str):
 PHYSICAL = load("physical_liquids")
 
 
-def test_the_second_edition_of_the_physical_liquids_differs_in_estimator_and_in_what_auto_chooses():
+def test_the_second_edition_of_the_physical_liquids_differs_in_estimator_and_chosen_effects():
     first, second = (load(name) for name in ("physical_liquids", "physical2"))
     assert (first.liquids, first.conditions) == (second.liquids, second.conditions)
     assert (first.scene.velocity, second.scene.velocity) == (Ewma(), Kalman())
     assert first.scene.model_copy(update={"velocity": Kalman(), "accuracy": second.scene.accuracy}) == second.scene
     assert (first.scene.accuracy.without, second.scene.accuracy.without) == (("unsteady_drag",), ())
-    chosen = {name: resolve(second.scene_of(name)).liquids[0].effects for name in second.liquids}
-    assert chosen.pop("water") == ("drag", "added_mass")
-    assert all("unsteady_drag" in effects and "drag" not in effects for effects in chosen.values())
+    effects_of = {name: resolve(second.scene_of(name)).liquids[0].effects for name in second.liquids}
+    assert effects_of.pop("water") == ("drag", "added_mass")
+    assert all("unsteady_drag" in effects and "drag" not in effects for effects in effects_of.values())
     assert not any("unsteady_drag" in resolve(first.scene_of(name)).liquids[0].effects for name in first.liquids)
 
 

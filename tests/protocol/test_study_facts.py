@@ -102,13 +102,13 @@ WITHIN = {"blocks": ("near",), "conditions": ("thin", "thick")}
 @pytest.mark.parametrize(
     ("keys", "sentence"),
     [
-        (BETWEEN, "threshold differs between near and far"),
+        (BETWEEN, "the threshold differs between near and far"),
         (BETWEEN | {"measure": "d_prime", "expected": "lower"}, "sensitivity (d′) is lower in near than in far"),
         (WITHIN | {"measure": "warm", "expected": "higher", "bound": 0.5},
          "agreement with “warm” is higher in thin than in thick in block near, with an equivalence bound of 0.5"),
         (BETWEEN | {"measure": "effort", "form": "load"}, "“effort” (load) differs between near and far"),
         ({"blocks": ("far",), "groups": ("old", "young"), "measure": "pse"},
-         "point of subjective equality differs between old and young in block far"),
+         "the point of subjective equality differs between old and young in block far"),
         (BETWEEN | {"groups": ("old", "young"), "expected": "higher"},
          "the difference in threshold between near and far is higher in old than in young (interaction)"),
         (WITHIN | {"groups": ("old", "young"), "measure": "exponent", "bound": 2},
@@ -144,7 +144,7 @@ def test_a_hypothesis_has_the_names_that_readers_know() -> None:
         ({"measure": "threshold", "value": 12.5, "source": "ours"}, "", "near: threshold 12.5, ours"),
     ],
 )  # fmt: skip
-def test_a_published_value_is_told_with_its_unit_and_source(keys: dict[str, Any], unit: str, text: str) -> None:
+def test_a_published_value_is_described_with_its_unit_and_source(keys: dict[str, Any], unit: str, text: str) -> None:
     assert Published.model_validate({"block": "near"} | keys).described(unit) == text
 
 
@@ -173,7 +173,7 @@ def test_each_decision_about_the_analysis_has_its_own_row() -> None:
     of_measure = {"threshold": "just-noticeable difference"}
 
     def described(decided: Analysis, named_by: list[str], **facts: Any) -> list[tuple[str, str]]:
-        return [*decided.described(named_by, measure_words=lambda contrast: of_measure[contrast.measure], **facts)]
+        return [*decided.described(named_by, measure_text=lambda contrast: of_measure[contrast.measure], **facts)]
 
     rows = described(decided, ["oil by like_oil"], units={"near": "ms"}, statements=True)
     statements = [
@@ -204,11 +204,11 @@ def test_each_decision_about_the_analysis_has_its_own_row() -> None:
     }  # fmt: skip
 
 
-def test_simulated_participants_are_told_and_compared_with_the_published_kinds() -> None:
+def test_simulated_participants_are_described_and_compared_with_the_published_kinds() -> None:
     stated = SimulatedParticipants(noise_sd=0.8, bias_sd=0.3, slope_sd=0.6, lapse_rate=0.05)
-    told = "noise SD 0.8, response bias SD 0.3, slope SD 0.6"
-    assert stated.described() == f"{told}, lapse rate 0.05"
-    assert stated.model_copy(update={"lapse_rate": 0}).described() == told
+    spreads = "noise SD 0.8, response bias SD 0.3, slope SD 0.6"
+    assert stated.described() == f"{spreads}, lapse rate 0.05"
+    assert stated.model_copy(update={"lapse_rate": 0}).described() == spreads
     kinds = compared_kinds(stated)
     assert list(kinds) == ["as in the study file", "consistent", "noisy"]
     assert kinds["as in the study file"] is stated
@@ -247,10 +247,10 @@ def test_a_participants_own_codes_are_all_codes_of_the_block() -> None:
 
 
 def test_scenes_without_a_study_are_described_with_their_own_numbers() -> None:
-    one = scene(force_limit_n=6.5, rate_hz=2000, scale=4)
-    ball = one.model_copy(update={"body": one.body.model_copy(update={"diameter_m": 0.07})})
-    told = [" ".join(line.split()) for line in describe_scenes({"water": ball}).splitlines()]
-    assert told[:5] == [
+    ball_scene = scene(force_limit_n=6.5, rate_hz=2000, scale=4)
+    ball = ball_scene.model_copy(update={"body": ball_scene.body.model_copy(update={"diameter_m": 0.07})})
+    lines = [" ".join(line.split()) for line in describe_scenes({"water": ball}).splitlines()]
+    assert lines[:5] == [
         "Liquids that are not part of a study",
         "Force limit 6.5 N",
         "Servo 2000 Hz",
@@ -258,7 +258,7 @@ def test_scenes_without_a_study_are_described_with_their_own_numbers() -> None:
         "Ball 70 mm in the scene (17.5 mm in the hand frame)",
     ]
     for velocity, default in ((Ewma(), Kalman()), (Ewma(alpha=0.2), Ewma(alpha=0.2)), (Raw(), Raw())):
-        assert with_default_estimator(one.model_copy(update={"velocity": velocity})).velocity == default
+        assert with_default_estimator(ball_scene.model_copy(update={"velocity": velocity})).velocity == default
 
 
 @pytest.mark.parametrize(
@@ -311,8 +311,8 @@ def test_pages_ask_about_unclear_numbers_and_count_missing_questions() -> None:
     english, german = words("en"), words("de")
     for language, reading, other in ((english, "2500", "2.5"), (german, "2500", "2,5")):
         typed = "2,500" if language is english else "2.500"
-        said = language.unclear_number(f" {typed} ")
-        assert [text in said for text in (typed, reading, other)] == [True] * 3
+        prompt = language.unclear_number(f" {typed} ")
+        assert [text in prompt for text in (typed, reading, other)] == [True] * 3
         assert language.unclear_number("2500") == ""
     assert english.unclear_number("2.5") == ""
     assert english.questions_missing([3]) != english.missing([3])

@@ -52,7 +52,7 @@ def test_the_studys_hash_covers_the_footage(study: Path) -> None:
     assert parse(changed, "mine.toml").conditions["clip"] != parse(source, "mine.toml").conditions["clip"]
 
 
-def test_footage_and_liquid_files_come_back_from_one_source() -> None:
+def test_footage_and_liquid_files_are_restored_from_one_source() -> None:
     text = b'format = 2\n[liquids.a]\nfile = "a.toml"\n[conditions.a]\nview = "a.mp4"\n'
     source = StudySource(text, footage={"a.mp4": "00ff"}).with_liquids(lambda name: f"# {name}")
     assert StudySource.split(source.content) == source == (text, {"a.toml": "# a.toml"}, {"a.mp4": "00ff"})
@@ -65,6 +65,6 @@ def test_footage_and_liquid_files_come_back_from_one_source() -> None:
 )
 def test_a_view_that_cannot_be_is_named(study: Path, old: str, new: str, problem: str) -> None:
     study.write_text(study.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8", newline="\n")
-    with pytest.raises(ProtocolError) as refused:
+    with pytest.raises(ProtocolError) as error:
         load(study)
-    assert problem in str(refused.value)
+    assert problem in str(error.value)

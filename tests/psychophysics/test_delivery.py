@@ -41,28 +41,30 @@ def damper(b_nspm: float, scale: float, velocity: Velocity) -> Scene:
     return Scene(liquids=(liquid,), scale=scale, velocity=velocity)
 
 
-def felt(b_nspm: float, t_s: Any, position_m: Any, scale: float = 1.0, velocity: Velocity | None = None) -> Any:
+def samples_through_damper(
+    b_nspm: float, t_s: Any, position_m: Any, scale: float = 1.0, velocity: Velocity | None = None
+) -> Any:
     """Return the samples of a hand's motion through a damper, with its positions in the hand frame."""
     samples = samples_along(damper(b_nspm, scale, velocity or Ewma()), Path(t_s, scale * position_m))
     samples.position_m = position_m
     return samples
 
 
-def fitted(samples: Any, t_s: Any, from_s: float = 1.0) -> tuple[float, float]:
-    moved = motion(t_s, samples.position_m, 1 / RATE_HZ).after(from_s)
-    found = damping(interpolate_vectors(moved.times_s, t_s, samples.device_force_n), moved)
-    assert found is not None
-    return found
+def fitted_damping(samples: Any, t_s: Any, from_s: float = 1.0) -> tuple[float, float]:
+    hand_motion = motion(t_s, samples.position_m, 1 / RATE_HZ).after(from_s)
+    fit = damping(interpolate_vectors(hand_motion.times_s, t_s, samples.device_force_n), hand_motion)
+    assert fit is not None
+    return fit
 
 
 def test_damping_and_mass_of_an_exact_force_are_found() -> None:
     t_s, position_m = swing()
     position_m[:, 1] = 0.01 * np.cos(2 * np.pi * 1.7 * t_s)
-    moved = motion(t_s, position_m, 1 / RATE_HZ)
-    force_n = -8.0 * moved.velocity_mps - 0.2 * moved.acceleration_mps2
-    assert damping(force_n, moved) == pytest.approx((8.0, 0.2), rel=1e-12)
-    true_mps = 2 * np.pi * 0.02 * np.cos(2 * np.pi * moved.times_s)
-    assert moved.velocity_mps[:, 0] == pytest.approx(true_mps, abs=1e-5)
+    hand_motion = motion(t_s, position_m, 1 / RATE_HZ)
+    force_n = -8.0 * hand_motion.velocity_mps - 0.2 * hand_motion.acceleration_mps2
+    assert damping(force_n, hand_motion) == pytest.approx((8.0, 0.2), rel=1e-12)
+    true_mps = 2 * np.pi * 0.02 * np.cos(2 * np.pi * hand_motion.times_s)
+    assert hand_motion.velocity_mps[:, 0] == pytest.approx(true_mps, abs=1e-5)
 
 
 def test_a_cubic_is_differentiated_exactly_at_uneven_times_to_the_error_of_interpolation() -> None:
@@ -77,23 +79,23 @@ def test_a_cubic_is_differentiated_exactly_at_uneven_times_to_the_error_of_inter
 
 
 @pytest.mark.parametrize("position_m", [np.zeros((2000, 3)), np.zeros((30, 3)), np.zeros((0, 3))])
-def test_a_hand_at_rest_has_no_damping(position_m: Any) -> None:
-    moved = motion(np.arange(len(position_m)) / RATE_HZ, position_m, 1 / RATE_HZ)
-    assert damping(np.ones((len(moved.times_s), 3)), moved) is None
-    assert moved.rms_speed_mps == 0
+def test_the_damping_of_a_resting_hand_is_unknown(position_m: Any) -> None:
+    hand_motion = motion(np.arange(len(position_m)) / RATE_HZ, position_m, 1 / RATE_HZ)
+    assert damping(np.ones((len(hand_motion.times_s), 3)), hand_motion) is None
+    assert hand_motion.rms_speed_mps == 0
 
 
-def test_a_hand_that_hardly_moves_has_no_damping() -> None:
+def test_the_damping_of_a_barely_moving_hand_is_unknown() -> None:
     for amplitude_m, rests in ((1e-5, True), (5e-5, False)):
-        moved = motion(*swing(amplitude_m=amplitude_m), 1 / RATE_HZ)
-        assert (damping(-8.0 * moved.velocity_mps, moved) is None) == rests
+        hand_motion = motion(*swing(amplitude_m=amplitude_m), 1 / RATE_HZ)
+        assert (damping(-8.0 * hand_motion.velocity_mps, hand_motion) is None) == rests
 
 
 @needs_servo
 @pytest.mark.parametrize(("frequency_hz", "low"), [(1.0, 0.005), (2.0, 0.014)])
 def test_the_lag_of_ewma_takes_its_share_through_the_compiled_tick(frequency_hz: float, low: float) -> None:
     t_s, position_m = swing(frequency_hz)
-    b_nspm, _ = fitted(felt(8, t_s, position_m), t_s)
+    b_nspm, _ = fitted_damping(samples_through_damper(8, t_s, position_m), t_s)
     assert 1 - b_nspm / 8 == pytest.approx(low, abs=0.002)
 
 
@@ -101,18 +103,20 @@ def test_the_lag_of_ewma_takes_its_share_through_the_compiled_tick(frequency_hz:
 @pytest.mark.parametrize("b_nspm", [4.0, 32.0])
 def test_the_same_lag_acts_as_a_negative_mass_of_9_ms_times_the_damping(b_nspm: float) -> None:
     t_s, position_m = swing()
-    assert fitted(felt(b_nspm, t_s, position_m), t_s)[1] == pytest.approx(-9.4e-3 * b_nspm, rel=0.05)
+    assert fitted_damping(samples_through_damper(b_nspm, t_s, position_m), t_s)[1] == pytest.approx(
+        -9.4e-3 * b_nspm, rel=0.05
+    )
 
 
 @needs_servo
 def test_encoder_counts_of_a_falcon_scatter_the_damping_by_a_fifth_of_a_percent() -> None:
-    found = []
+    dampings = []
     for phase in range(20):
         t_s, position_m = swing(amplitude_m=0.02 + 1e-5 * phase)
         counted_m = np.rint((position_m + 1e-6 * phase) / COUNT_M) * COUNT_M
-        found.append(fitted(felt(8, t_s, counted_m), t_s)[0] / 8)
-    assert np.std(found) < 0.004
-    assert 1 - np.mean(found) == pytest.approx(0.005, abs=0.003)
+        dampings.append(fitted_damping(samples_through_damper(8, t_s, counted_m), t_s)[0] / 8)
+    assert np.std(dampings) < 0.004
+    assert 1 - np.mean(dampings) == pytest.approx(0.005, abs=0.003)
 
 
 @pytest.mark.slow
@@ -120,22 +124,22 @@ def test_encoder_counts_of_a_falcon_scatter_the_damping_by_a_fifth_of_a_percent(
 @pytest.mark.parametrize("velocity", [Ewma(), Scene.model_fields["velocity"].get_default(call_default_factory=True)])
 def test_a_linear_law_is_a_damper_at_the_hand_at_any_scale(velocity: Velocity) -> None:
     t_s, position_m = swing()
-    found = [felt(8, t_s, position_m, scale, velocity) for scale in (0.5, 1.0, 3.0, 10.0)]
-    forces_n = [samples.device_force_n for samples in found]
-    for scale, samples, force_n in zip((0.5, 1.0, 3.0, 10.0), found, forces_n, strict=True):
+    forces = [samples_through_damper(8, t_s, position_m, scale, velocity) for scale in (0.5, 1.0, 3.0, 10.0)]
+    forces_n = [samples.device_force_n for samples in forces]
+    for scale, samples, force_n in zip((0.5, 1.0, 3.0, 10.0), forces, forces_n, strict=True):
         assert force_n == pytest.approx(-8.0 * samples.velocity_mps / scale, abs=1e-9)
         assert force_n == pytest.approx(forces_n[1], abs=1e-6)
-    assert fitted(found[2], t_s)[0] == pytest.approx(8.0, rel=0.01)
+    assert fitted_damping(forces[2], t_s)[0] == pytest.approx(8.0, rel=0.01)
 
 
 @pytest.mark.slow
-def test_nothing_but_numpy_and_itself_is_loaded() -> None:
+def test_the_package_loads_only_numpy_and_itself() -> None:
     program = (
         "import sys, study_app.psychophysics.delivery\n"
         "print(sorted(name for name in sys.modules if name.startswith(('study_app.', 'scipy', 'pandas', 'numba'))))"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "['study_app.psychophysics', 'study_app.psychophysics.delivery']"
+    process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert process.stdout.strip() == "['study_app.psychophysics', 'study_app.psychophysics.delivery']"
 
 
 def shifted(rows: float, lasts_s: float = 3.0) -> tuple[Any, Any]:
@@ -157,7 +161,7 @@ def test_the_lag_of_a_force_is_found_within_a_tenth_of_a_row(rows: float) -> Non
     assert lag(noisy, model, 260) == pytest.approx(rows, abs=1.0)
 
 
-def test_the_share_of_a_force_that_was_sent_ignores_what_is_across_it() -> None:
+def test_the_sent_share_of_a_force_ignores_perpendicular_components() -> None:
     model = np.array([[2.0, 0.0, 1.0], [0.0, 3.0, 0.0]])
     across = np.array([[1.0, 5.0, -2.0], [4.0, 0.0, 7.0]])
     assert sent_share(0.4 * model + across, model) == pytest.approx(0.4)
@@ -181,7 +185,7 @@ def test_a_part_of_a_motion_has_both_of_its_ends() -> None:
     assert part.rms_speed_mps == pytest.approx(np.sqrt((9 + 16 + 25 + 36 + 49 + 64) / 2))
 
 
-def test_a_force_in_the_other_direction_or_none_has_no_lag() -> None:
+def test_the_lag_of_an_opposite_or_zero_force_is_unknown() -> None:
     sent, model = shifted(0, lasts_s=1.0)
     assert lag(0 * sent, model, 100) is None
     assert lag(sent, 0 * model, 100) is None
@@ -197,5 +201,5 @@ def test_the_lag_of_a_link_is_found_through_the_compiled_tick(delay_ms: int, vel
     t_s, position_m = swing(lasts_s=4.0)
     linked = damper(0.3, 1.0, velocity).model_copy(update={"link": ForceLink(delay_s=delay_ms / 1000)})
     samples = samples_along(linked, Path(t_s, position_m))
-    found = lag(samples.device_force_n[500:], samples.force_n[500:], 260)
-    assert found == pytest.approx(delay_ms, abs=0.05)
+    lag_found = lag(samples.device_force_n[500:], samples.force_n[500:], 260)
+    assert lag_found == pytest.approx(delay_ms, abs=0.05)

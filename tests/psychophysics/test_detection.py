@@ -81,31 +81,33 @@ def test_proportions_are_those_of_simulated_observers(task):
 
 
 def test_yes_no_has_the_published_d_prime_and_criterion():
-    found = yes_no(8e6, 1e7, 4e6, 1e7)  # Macmillan & Creelman 2005, chapter 1: H = .8, F = .4
-    assert (found.d_prime, found.criterion) == pytest.approx((1.095, -0.294), abs=5e-4)
+    estimate = yes_no(8e6, 1e7, 4e6, 1e7)  # Macmillan & Creelman 2005, chapter 1: H = .8, F = .4
+    assert (estimate.d_prime, estimate.criterion) == pytest.approx((1.095, -0.294), abs=5e-4)
 
 
 def test_the_variance_of_d_prime_is_that_of_repeated_experiments():
     draw, signals, noises = np.random.default_rng(5), 200, 120
     hits, alarms = draw.binomial(signals, 0.75, 4000), draw.binomial(noises, 0.2, 4000)
-    found = [yes_no(h, signals, f, noises) for h, f in zip(hits, alarms, strict=True)]
-    assert np.mean([one.variance for one in found]) == pytest.approx(np.var([one.d_prime for one in found]), rel=0.06)
+    estimates = [yes_no(h, signals, f, noises) for h, f in zip(hits, alarms, strict=True)]
+    assert np.mean([estimate.variance for estimate in estimates]) == pytest.approx(
+        np.var([estimate.d_prime for estimate in estimates]), rel=0.06
+    )
 
 
 def test_two_intervals_separates_sensitivity_from_a_bias_to_the_first():
     d_prime, bias, n = 1.2, 0.4, 10**7
     high, low = (norm.cdf((sign * d_prime + bias) / math.sqrt(2)) for sign in (1, -1))
-    found = two_intervals(high * n, n, low * n, n)
-    assert found.d_prime == pytest.approx(d_prime, abs=1e-5)
-    assert found.criterion == pytest.approx(-bias / math.sqrt(2), abs=1e-5)
-    assert found.variance == pytest.approx(yes_no(high * n, n, low * n, n).variance / 2)
+    estimate = two_intervals(high * n, n, low * n, n)
+    assert estimate.d_prime == pytest.approx(d_prime, abs=1e-5)
+    assert estimate.criterion == pytest.approx(-bias / math.sqrt(2), abs=1e-5)
+    assert estimate.variance == pytest.approx(yes_no(high * n, n, low * n, n).variance / 2)
     assert two_intervals(9, 10, 0, 0) is None
 
 
 def test_same_different_finds_the_planted_d_prime_and_criterion_under_differencing():
     d_prime, k, n = 1.7, 1.3, 10**7
-    found = same_different(n * different_rate(d_prime, k), n, n * different_rate(0, k), n, "differencing")
-    assert (found.d_prime, found.criterion) == pytest.approx((d_prime, k), abs=1e-5)
+    estimate = same_different(n * different_rate(d_prime, k), n, n * different_rate(0, k), n, "differencing")
+    assert (estimate.d_prime, estimate.criterion) == pytest.approx((d_prime, k), abs=1e-5)
     draw = np.random.default_rng(1).normal(size=(400_000, 2))
     assert (np.abs(draw[:, 0] - draw[:, 1] + d_prime) > k).mean() == pytest.approx(different_rate(d_prime, k), abs=3e-3)
 
@@ -113,9 +115,9 @@ def test_same_different_finds_the_planted_d_prime_and_criterion_under_differenci
 def test_same_different_of_an_unbiased_independent_observer():
     n, d_prime = 10**8, 1.5
     share = proportion_correct("samedifferent independent", d_prime)
-    found = same_different(n * share, n, n * (1 - share), n, "independent")
-    assert found.d_prime == pytest.approx(d_prime, abs=1e-5)
-    assert found.criterion is None
+    estimate = same_different(n * share, n, n * (1 - share), n, "independent")
+    assert estimate.d_prime == pytest.approx(d_prime, abs=1e-5)
+    assert estimate.criterion is None
     for model in ("independent", "differencing"):
         more, fewer = same_different(12, 20, 3, 20, model), same_different(3, 20, 12, 20, model)
         assert fewer.d_prime == pytest.approx(-more.d_prime)

@@ -42,29 +42,35 @@ def grid(**changed):
 
 
 def test_the_prior_is_flat_in_the_threshold_log_normal_in_the_width_and_listed_for_the_lapse_rate():
-    one = grid()
-    assert one.prior.sum() == pytest.approx(1.0)
-    assert one.prior.sum(axis=(1, 2, 3)) == pytest.approx(1 / 11)
-    assert one.prior.sum(axis=(0, 1, 3)) == pytest.approx([0.4, 0.4, 0.2])
-    widths = one.prior.sum(axis=(0, 2, 3))
-    z = np.log(np.array(one.widths) / 1.4) / math.log(1.5)
+    prior = grid()
+    assert prior.prior.sum() == pytest.approx(1.0)
+    assert prior.prior.sum(axis=(1, 2, 3)) == pytest.approx(1 / 11)
+    assert prior.prior.sum(axis=(0, 1, 3)) == pytest.approx([0.4, 0.4, 0.2])
+    widths = prior.prior.sum(axis=(0, 2, 3))
+    z = np.log(np.array(prior.widths) / 1.4) / math.log(1.5)
     assert widths / widths.max() == pytest.approx(np.exp(-(z**2) / 2) / np.exp(-(z**2) / 2).max())
     assert grid(width_prior=None).prior.sum(axis=(0, 2, 3)) == pytest.approx(1 / 5)
 
 
 @pytest.mark.parametrize("guesses", [(0.5,), None, FREE_GUESSES])
 def test_the_posterior_is_the_product_of_prior_and_likelihood_of_each_cell(guesses):
-    one = grid(guesses=guesses)
+    posterior_grid = grid(guesses=guesses)
     successes, failures = [1, 0, 3, 4, 9, 10], [3, 2, 2, 1, 1, 0]
-    by_hand = np.empty(one.shape)
-    for t, w, lapse, g in itertools.product(*map(range, one.shape)):
-        rates = (one.lapses[lapse], one.lapses[lapse]) if guesses is None else (guesses[g], one.lapses[lapse])
+    by_hand = np.empty(posterior_grid.shape)
+    for t, w, lapse, g in itertools.product(*map(range, posterior_grid.shape)):
+        rates = (
+            (posterior_grid.lapses[lapse], posterior_grid.lapses[lapse])
+            if guesses is None
+            else (guesses[g], posterior_grid.lapses[lapse])
+        )
         likelihood = 1.0
         for level, yes, no in zip(LEVELS, successes, failures, strict=True):
-            p = success("weibull", level, one.thresholds[t], one.widths[w], *rates).clip(CLIP, 1 - CLIP)
+            p = success("weibull", level, posterior_grid.thresholds[t], posterior_grid.widths[w], *rates).clip(
+                CLIP, 1 - CLIP
+            )
             likelihood *= p**yes * (1 - p) ** no
-        by_hand[t, w, lapse, g] = likelihood * one.prior[t, w, lapse, g]
-    assert fit(LEVELS, successes, failures, one).weights == pytest.approx(by_hand / by_hand.sum(), rel=1e-9)
+        by_hand[t, w, lapse, g] = likelihood * posterior_grid.prior[t, w, lapse, g]
+    assert fit(LEVELS, successes, failures, posterior_grid).weights == pytest.approx(by_hand / by_hand.sum(), rel=1e-9)
 
 
 def test_the_prior_of_mean_lapse_rates_is_exponential_and_that_of_one_person_needs_no_group():
@@ -73,22 +79,22 @@ def test_the_prior_of_mean_lapse_rates_is_exponential_and_that_of_one_person_nee
     assert weights @ GROUP_LAPSES == pytest.approx(MEAN_LAPSE, rel=0.03)
     assert weights[0] == pytest.approx(1 - math.exp(-0.006 / MEAN_LAPSE))  # up to half-way to the next
     lapses = (0.0, 0.01, 0.03, 0.09, 0.16)
-    one = grid(width_prior=None, lapses=lapses, lapse_prior=lapse_prior(lapses))
-    (factors,) = group_priors([fit((), (), (), one)], (1.4, 1.5)).factors
-    of_lapse = (factors * one.lapse_prior).sum(axis=0)
-    assert of_lapse / of_lapse.sum() == pytest.approx(one.lapse_prior)
+    lapse_grid = grid(width_prior=None, lapses=lapses, lapse_prior=lapse_prior(lapses))
+    (factors,) = group_priors([fit((), (), (), lapse_grid)], (1.4, 1.5)).factors
+    of_lapse = (factors * lapse_grid.lapse_prior).sum(axis=0)
+    assert of_lapse / of_lapse.sum() == pytest.approx(lapse_grid.lapse_prior)
 
 
 def test_a_few_lapses_raise_the_lapse_rate_of_all_and_the_error_that_they_share():
     lapses = (0.0, 0.01, 0.03, 0.09, 0.16)
-    one = grid(width_prior=None, lapses=lapses, lapse_prior=lapse_prior(lapses))
+    lapse_grid = grid(width_prior=None, lapses=lapses, lapse_prior=lapse_prior(lapses))
 
     def priors(wrong_at_the_top):
         successes, failures = [10, 11, 14, 18, 20, 40 - wrong_at_the_top], [10, 9, 6, 2, 0, wrong_at_the_top]
-        return group_priors([fit(LEVELS, successes, failures, one)] * 10, (1.4, 1.5))
+        return group_priors([fit(LEVELS, successes, failures, lapse_grid)] * 10, (1.4, 1.5))
 
     none, many = priors(0), priors(3)
-    mean_rates = [(it.factors[0] * one.lapse_prior).sum(axis=0) @ lapses for it in (none, many)]
+    mean_rates = [(posterior.factors[0] * lapse_grid.lapse_prior).sum(axis=0) @ lapses for posterior in (none, many)]
     assert mean_rates[0] < 0.01
     assert 0.04 < mean_rates[1] < 0.12  # 3 of 40
     assert min(none.below, none.above, many.below, many.above) >= 0.0
@@ -96,17 +102,17 @@ def test_a_few_lapses_raise_the_lapse_rate_of_all_and_the_error_that_they_share(
 
 
 def test_many_answers_find_the_planted_function():
-    one = grid(thresholds=evenly(-1.5, 0.0, 61), widths=geometric(0.5, 4.0, 9))
+    fine_grid = grid(thresholds=evenly(-1.5, 0.0, 61), widths=geometric(0.5, 4.0, 9))
     levels = evenly(-1.5, 0.0, 15)
-    p = success("weibull", levels, -0.7, one.widths[4], 0.5, 0.02)
-    found = fit(levels, 1e4 * p, 1e4 * (1 - p), one)
-    weights = found.weights
-    assert found.threshold == pytest.approx(-0.7, abs=0.01)
+    p = success("weibull", levels, -0.7, fine_grid.widths[4], 0.5, 0.02)
+    fitted = fit(levels, 1e4 * p, 1e4 * (1 - p), fine_grid)
+    weights = fitted.weights
+    assert fitted.threshold == pytest.approx(-0.7, abs=0.01)
     assert weights.sum(axis=(0, 2, 3)).argmax() == 4
     assert weights.sum(axis=(0, 1, 3)).argmax() == 1
 
 
-def test_one_answer_excludes_no_cell():
+def test_one_answer_does_not_exclude_any_cell():
     certain = grid(guesses=(0.0,), lapses=(0.0,), lapse_prior=(1.0,), widths=(0.01, 0.02))
     weights = fit((-5.0, 5.0), (1, 0), (0, 1), certain).weights
     assert np.isfinite(weights).all()
@@ -134,8 +140,8 @@ def test_threshold_is_the_middle_and_the_width_reaches_from_5_to_95_percent(fami
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_success_goes_from_guessing_to_lapsing_and_stays_finite(family):
-    found = success(family, [-1e6, 1e6], 0.0, 0.5, 0.25, 0.04)
-    assert found == pytest.approx([0.25, 0.96], abs=1e-12)
+    probabilities = success(family, [-1e6, 1e6], 0.0, 0.5, 0.25, 0.04)
+    assert probabilities == pytest.approx([0.25, 0.96], abs=1e-12)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -154,9 +160,9 @@ def test_a_linear_observer_is_a_weibull_of_a_known_width():
     w75 = 0.2
     u = np.linspace(math.log10(0.02), math.log10(0.6), 31)
     spread = math.log1p(w75) / 0.6744897501960817
-    shown = ndtr(np.log1p(10.0**u) / spread)
+    expected = ndtr(np.log1p(10.0**u) / spread)
     (threshold, width), _ = curve_fit(
-        lambda at, middle, wide: success("weibull", at, middle, wide, 0.5, 0.0), u, shown, (-0.7, 1.4)
+        lambda at, middle, wide: success("weibull", at, middle, wide, 0.5, 0.0), u, expected, (-0.7, 1.4)
     )
     assert 10.0**threshold == pytest.approx(w75, rel=0.024)
     assert 1.4 <= width <= 1.7
@@ -193,10 +199,10 @@ def test_the_published_threshold_of_beetles():
         lapse_prior=(1.0,),
         guesses=(0.0,),
     )
-    found = fit(DOSES, KILLED, BEETLES - KILLED, plain)
-    assert found.threshold == pytest.approx(1.77172, abs=3e-4)
-    assert 2 * math.log(19) / found.others[0] == pytest.approx(34.2703, rel=0.03)
-    low, high = found.interval
+    fitted = fit(DOSES, KILLED, BEETLES - KILLED, plain)
+    assert fitted.threshold == pytest.approx(1.77172, abs=3e-4)
+    assert 2 * math.log(19) / fitted.others[0] == pytest.approx(34.2703, rel=0.03)
+    low, high = fitted.interval
     assert high - low == pytest.approx(0.0152, rel=0.05)  # Wald's, from the published errors
 
 
@@ -213,24 +219,26 @@ def log10_of(percent):
     ("participants", "trials", "percent"), [(10, 60, 27), (20, 60, 17), (20, 100, 15)]
 )  # thresholds of people who differ by a factor of 1.2, with a standard deviation of 28 % at 60 trials
 def test_a_groups_interval_is_students_over_errors_and_people(participants, trials, percent):
-    one = Expected(spacing="log", trials=60, standards=1, halves={}, spreads={"": 0.28 / math.log(10)}, threshold=0.2)
-    assert 100 * one.group_half_width(participants, trials) == pytest.approx(percent, abs=1.5)
+    expected = Expected(
+        spacing="log", trials=60, standards=1, halves={}, spreads={"": 0.28 / math.log(10)}, threshold=0.2, decade=1.0
+    )
+    assert 100 * expected.group_half_width(participants, trials) == pytest.approx(percent, abs=1.5)
 
 
 def test_the_min_sample_and_trials_for_a_precision():
-    one = Expected(spacing="log", trials=20, standards=1, halves={}, spreads={"": 0.2}, threshold=0.2)
-    people = one.participants_for(0.15)
-    assert one.group_half_width(people) <= 0.15 < one.group_half_width(people - 1)
-    trials = one.trials_for(0.15, 20)
-    assert one.group_half_width(20, trials) <= 0.15 < one.group_half_width(20, trials - 10)
-    assert one.trials_for(0.05, 10) is None  # people differ by more
-    assert one.participants_for(0.001) is None
-    assert one.group_half_width(1) == math.inf
+    expected = Expected(spacing="log", trials=20, standards=1, halves={}, spreads={"": 0.2}, threshold=0.2, decade=1.0)
+    people = expected.participants_for(0.15)
+    assert expected.group_half_width(people) <= 0.15 < expected.group_half_width(people - 1)
+    trials = expected.trials_for(0.15, 20)
+    assert expected.group_half_width(20, trials) <= 0.15 < expected.group_half_width(20, trials - 10)
+    assert expected.trials_for(0.05, 10) is None  # people differ by more
+    assert expected.participants_for(0.001) is None
+    assert expected.group_half_width(1) == math.inf
 
 
 def test_percentages_are_those_of_garcia_perez():
-    found = [100 * converges_to(n, ratio) for n, ratio in RATIOS.items()]
-    assert found == pytest.approx([77.85, 80.35, 83.15, 85.84], abs=0.005)
+    percentages = [100 * converges_to(n, ratio) for n, ratio in RATIOS.items()]
+    assert percentages == pytest.approx([77.85, 80.35, 83.15, 85.84], abs=0.005)
     assert 100 * converges_to(2, 1.0) == pytest.approx(70.7, abs=0.05)
 
 
@@ -247,10 +255,10 @@ def test_percentages_are_those_of_garcia_perez():
     ],
 )
 def test_percent_correct_at_the_mean_of_reversals_in_the_long_run(down_after, ratio, reached):
-    """By the step up in standard deviations of the observer: equal steps depend on it, weighted ones hardly."""
+    """Percentages by the step up in observer SDs: those of equal steps depend on it, those of weighted steps hardly."""
     draw = np.random.default_rng(down_after)
     for step_up, percent in zip((0.25, 0.5, 1.0, 2.0), reached, strict=True):
-        one = Staircase(down_after=down_after, step_up=step_up, ratio=ratio, low=-50.0, high=50.0, begin=0.5)
+        staircase = Staircase(down_after=down_after, step_up=step_up, ratio=ratio, low=-50.0, high=50.0, begin=0.5)
         u, run, before, reversals = 0.5, 0, 0, []
         for chance in draw.random(40_000):  # the rule itself, since `next` looks at all answers each time
             success = chance < 0.5 + 0.5 * ndtr(u)
@@ -260,5 +268,5 @@ def test_percent_correct_at_the_mean_of_reversals_in_the_long_run(down_after, ra
             if move * before < 0:
                 reversals.append(u)
             before = move or before
-            u += one.step_up * move * (ratio if move < 0 else 1.0)
+            u += staircase.step_up * move * (ratio if move < 0 else 1.0)
         assert 100 * (0.5 + 0.5 * ndtr(np.mean(reversals[2:]))) == pytest.approx(percent, abs=0.75)

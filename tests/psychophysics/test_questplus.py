@@ -32,8 +32,8 @@ ANALYSIS = Grid(
 
 
 def entropy(weights):
-    kept = weights[weights > 0]
-    return -float((kept * np.log(kept)).sum())
+    positive = weights[weights > 0]
+    return -float((positive * np.log(positive)).sum())
 
 
 @pytest.mark.parametrize("learn", ["threshold", "all"])
@@ -42,7 +42,7 @@ def test_the_expected_entropy_is_that_of_both_posteriors_weighted_by_their_proba
     successes, failures = np.zeros(31), np.zeros(31)
     successes[[10, 20]], failures[[10, 5]] = 3, 2
     before = fit(LEVELS, successes, failures, RUNNING).weights
-    (found,) = search.expected_entropy(before[None])
+    (entropies,) = search.expected_entropy(before[None])
     for level in (0, 7, 16, 30):
         probability = float((RUNNING.success([LEVELS[level]])[0] * before).sum())
         expected = 0.0
@@ -51,7 +51,7 @@ def test_the_expected_entropy_is_that_of_both_posteriors_weighted_by_their_proba
             after = fit(LEVELS, successes, failures, RUNNING).weights
             counts[level] -= 1
             expected += share * entropy(after.sum(axis=(1, 2, 3)) if learn == "threshold" else after)
-        assert found[level] == pytest.approx(expected, abs=1e-10)
+        assert entropies[level] == pytest.approx(expected, abs=1e-10)
 
 
 def test_of_levels_that_promise_the_same_the_lowest_is_taken():
@@ -156,9 +156,9 @@ def test_a_linear_observer_is_recovered_as_the_prototype_measured(trials, bias, 
             level = search.next(successes, failures)
             right = draw.random() < 0.01 + 0.98 * correct[level]
             (successes if right else failures)[level] += 1
-        found = fit(LEVELS, successes, failures, ANALYSIS)
-        low, high = found.interval
-        estimates.append(10.0**found.threshold)
+        fitted = fit(LEVELS, successes, failures, ANALYSIS)
+        low, high = fitted.interval
+        estimates.append(10.0**fitted.threshold)
         inside += low <= math.log10(w75) <= high
     ratios = np.array(estimates) / w75
     chance = 2 * 100 * ratios.std() / math.sqrt(observers)

@@ -43,24 +43,24 @@ def search(learn="threshold", guesses=(0.5,), noise=False):
 @pytest.mark.parametrize("learn", ["threshold", "all"])
 @pytest.mark.parametrize("noise", [0, 4, 3000])
 def test_search_tracks_choose_the_levels_that_the_search_chooses_one_by_one(learn, noise):
-    one = search(learn, FREE_GUESSES if noise else (0.5,), noise > 0)
-    heard = draws(noise, seed=2) if noise else None
-    found = search_tracks(one, observers(guess=0.1), draws(25), noise=heard)
+    level_search = search(learn, FREE_GUESSES if noise else (0.5,), noise > 0)
+    noise_draws = draws(noise, seed=2) if noise else None
+    tracks = search_tracks(level_search, observers(guess=0.1), draws(25), noise=noise_draws)
     for track in range(6):
-        counts = np.zeros((2, len(one.levels)))
-        if heard is not None:
-            yes = int((heard[track] < 0.1).sum())
+        counts = np.zeros((2, len(level_search.levels)))
+        if noise_draws is not None:
+            yes = int((noise_draws[track] < 0.1).sum())
             counts[:, 0] = yes, noise - yes
-        for level, success in zip(found.levels[track], found.successes[track], strict=True):
-            place = one.next(*counts)
-            assert one.levels[place] == level
+        for level, success in zip(tracks.levels[track], tracks.successes[track], strict=True):
+            place = level_search.next(*counts)
+            assert level_search.levels[place] == level
             counts[0 if success else 1, place] += 1
 
 
 def test_search_tracks_end_when_the_interval_is_narrow_enough():
-    one, most = search(), 0.9
-    found = search_tracks(one, observers(), draws(80), stop=(most, 10))
-    lengths = (~np.isnan(found.levels)).sum(axis=1)
+    level_search, most = search(), 0.9
+    tracks = search_tracks(level_search, observers(), draws(80), stop=(most, 10))
+    lengths = (~np.isnan(tracks.levels)).sum(axis=1)
     assert lengths.min() >= 10
     assert lengths.max() < 80
     for track, length in enumerate(lengths):
@@ -68,32 +68,32 @@ def test_search_tracks_end_when_the_interval_is_narrow_enough():
             if stop < 10:
                 continue
             counts = np.zeros((2, len(LEVELS)))
-            for level, success in list(zip(found.levels[track], found.successes[track], strict=True))[:stop]:
+            for level, success in list(zip(tracks.levels[track], tracks.successes[track], strict=True))[:stop]:
                 counts[0 if success else 1, LEVELS.index(level)] += 1
-            low, high = fit(one.levels, *counts, one.grid).interval
+            low, high = fit(level_search.levels, *counts, level_search.grid).interval
             assert (high - low <= most) == (stop == length)
-    assert not found.successes[np.isnan(found.levels)].any()
+    assert not tracks.successes[np.isnan(tracks.levels)].any()
 
 
 @pytest.mark.parametrize("down_after", [1, 2, 3])
 @pytest.mark.parametrize("stop", [None, (6, 20)])
 def test_staircase_tracks_present_the_levels_of_the_rule(down_after, stop):
-    one = Staircase(down_after=down_after, step_up=0.2, ratio=0.55, low=LOW, high=HIGH, begin=HIGH)
-    found = staircase_tracks(one, observers(), draws(60), stop)
-    for levels, successes in zip(found.levels, found.successes, strict=True):
+    staircase = Staircase(down_after=down_after, step_up=0.2, ratio=0.55, low=LOW, high=HIGH, begin=HIGH)
+    tracks = staircase_tracks(staircase, observers(), draws(60), stop)
+    for levels, successes in zip(tracks.levels, tracks.successes, strict=True):
         answers = []
         for level, success in zip(levels, successes, strict=True):
-            ended = stop is not None and len(answers) >= stop[1] and len(one.reversals(answers)) >= stop[0]
+            ended = stop is not None and len(answers) >= stop[1] and len(staircase.reversals(answers)) >= stop[0]
             assert np.isnan(level) == ended
             if ended:
                 break
-            assert level == pytest.approx(one.next(answers))
-            answers.append((one.next(answers), bool(success)))
+            assert level == pytest.approx(staircase.next(answers))
+            answers.append((staircase.next(answers), bool(success)))
 
 
 def test_constant_tracks_are_answered_with_the_probability_of_the_level():
-    found = constant_tracks(LEVELS, 4000, observers(2), draws(4000 * 15, 2))
+    tracks = constant_tracks(LEVELS, 4000, observers(2), draws(4000 * 15, 2))
     expected = observers(2).probability(np.array(LEVELS)[:, None]).T
-    for one, shares in zip(found.person_answers(np.array(LEVELS)), expected, strict=True):
-        assert (np.bincount(one.places) == 4000).all()
-        assert np.abs(np.bincount(one.places, one.successes) / 4000 - shares).max() < 4 * math.sqrt(0.25 / 4000)
+    for answers, shares in zip(tracks.person_answers(np.array(LEVELS)), expected, strict=True):
+        assert (np.bincount(answers.places) == 4000).all()
+        assert np.abs(np.bincount(answers.places, answers.successes) / 4000 - shares).max() < 4 * math.sqrt(0.25 / 4000)

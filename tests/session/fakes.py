@@ -59,8 +59,8 @@ class FakeServo:
     def run(self, seconds: float, position_m: Any = (0.0, 0.0, 0.0), **fields: Any) -> None:
         count = round(seconds * 1000)
         ticks = np.arange(self.ticks + 1, self.ticks + count + 1)
-        made = small.samples(ticks / 1000, np.tile(position_m, (count, 1)), tick=ticks, scene=self.scene, **fields)
-        self.telemetry.samples = np.concatenate((self.telemetry.samples, made)).view(np.recarray)
+        samples = small.samples(ticks / 1000, np.tile(position_m, (count, 1)), tick=ticks, scene=self.scene, **fields)
+        self.telemetry.samples = np.concatenate((self.telemetry.samples, samples)).view(np.recarray)
         self.ticks += count
 
     def now_ns(self) -> int:
@@ -134,7 +134,7 @@ class FakeJournal:
 
 
 class World:
-    """A runner of the small study with everything around it; ``log`` is what happened, in order.
+    """A runner of the small study with fake ports; ``log`` lists the calls in order.
 
     With ``paints`` a tank's first frame is painted as soon as its page is presented.
     """
@@ -158,7 +158,7 @@ class World:
         return self.runner.state
 
     def run(self, seconds: float, position_m: Any = (0.0, 0.0, 0.0), **fields: Any) -> None:
-        """Let time pass and look at the device once."""
+        """Advance the time and poll the device once."""
         self.servo.run(seconds, position_m, **fields)
         self.runner.poll()
 
@@ -171,7 +171,7 @@ class World:
 
 
 def step(world: World) -> None:
-    """Take the session one page further, or one target in a reaching task."""
+    """Advance the session by one page, or by one target of a reaching task."""
     state = world.state
     if state.phase is Phase.READING:
         world.runner.post(Continue(world.clock()))

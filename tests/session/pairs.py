@@ -54,16 +54,16 @@ def opened(one: Protocol | None = None, *, start: Start = FIRST, secret: bytes =
 
 
 def answer_of(state: SessionState, right: bool = True) -> str:
-    """Return the answer to the trial under way that is correct, or one that is not."""
+    """Return a correct or an incorrect answer to the current trial."""
     assert state.design is not None
     assert state.due is not None
     correct = state.design.correct(state.due.arrangement)
     assert correct is not None
-    return correct if right else next(one for one in state.design.answers if one != correct)
+    return correct if right else next(answer for answer in state.design.answers if answer != correct)
 
 
 def next_event(state: SessionState, at_s: float, right: bool = True) -> Any:
-    """Return an event that brings a session without incidents one step further."""
+    """Return the event that advances a session without incidents by one step."""
     match state.phase:
         case Phase.OPENING:
             return Begin(at_s)
@@ -98,8 +98,10 @@ def whole(state: SessionState, right: bool = True) -> list[dict[str, Any]]:
     while state.phase not in FINAL:
         state, commands = advance(state, next_event(state, at_s, right))
         lines += [
-            {"event": one.line.event, "t_s": at_s, **one.line.fields()} for one in commands if isinstance(one, Write)
+            {"event": command.line.event, "t_s": at_s, **command.line.fields()}
+            for command in commands
+            if isinstance(command, Write)
         ]
-        lines += [{"event": "end", "status": one.status} for one in commands if isinstance(one, Finish)]
+        lines += [{"event": "end", "status": command.status} for command in commands if isinstance(command, Finish)]
         at_s += 100.0
     return lines

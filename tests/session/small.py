@@ -62,7 +62,7 @@ def opened(seed: int = 1) -> SessionState:
 
 
 def next_event(state: SessionState, at_s: float) -> Any:
-    """Return an event that brings a session without incidents one step further."""
+    """Return the event that advances a session without incidents by one step."""
     match state.phase:
         case Phase.OPENING:
             return Begin(at_s)
@@ -93,10 +93,10 @@ def walk(state: SessionState, until: Phase, *, times: int = 1, at_s: float = 0.0
 def samples(times_s: Any, positions_m: Any, **fields: Any) -> Any:
     """Return telemetry: times (n,) [s], positions (n, 3) [m]; other fields as given."""
     times_s = np.asarray(times_s, np.float64)
-    made = np.zeros(len(times_s), SAMPLE).view(np.recarray)
-    made.time_ns = np.round(times_s * 1e9).astype(np.int64)
-    made.position_m = positions_m
-    made.fresh = 1
+    recording = np.zeros(len(times_s), SAMPLE).view(np.recarray)
+    recording.time_ns = np.round(times_s * 1e9).astype(np.int64)
+    recording.position_m = positions_m
+    recording.fresh = 1
     for name, value in fields.items():
-        made[name] = value
-    return made
+        recording[name] = value
+    return recording

@@ -12,7 +12,9 @@ from study_app.session.compile_worker import carry_out, start_compilation
 from tests.compiled import needs_servo
 
 
-def test_no_process_starts_if_nothing_can_be_stored_or_all_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_compilation_does_not_start_without_a_cache_or_with_a_full_one(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(kernels, "CACHE", None)
     assert start_compilation() is None
     monkeypatch.setattr(kernels, "CACHE", tmp_path)
@@ -23,19 +25,19 @@ def test_no_process_starts_if_nothing_can_be_stored_or_all_is(monkeypatch: pytes
 def test_the_cache_is_filled_once_every_device_was_opened_and_stopped(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    done: list[str] = []
+    calls: list[str] = []
     monkeypatch.setattr(kernels, "CACHE", tmp_path)
     monkeypatch.setattr(kernels, "following_compilation", lambda _send: nullcontext())
     monkeypatch.setattr(
-        "study_app.devices.rig.open_rig", lambda name, _settings: SimpleNamespace(stop=lambda: done.append(name))
+        "study_app.devices.rig.open_rig", lambda name, _settings: SimpleNamespace(stop=lambda: calls.append(name))
     )
-    carry_out(("scripted", "mouse"), done.append, lambda: False)
-    assert (done, [path.name for path in tmp_path.iterdir()]) == (["scripted", "mouse"], ["filled"])
+    carry_out(("scripted", "mouse"), calls.append, lambda: False)
+    assert (calls, [path.name for path in tmp_path.iterdir()]) == (["scripted", "mouse"], ["filled"])
 
 
 @needs_servo
 @pytest.mark.nightly
-def test_the_process_fills_the_cache_and_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_process_fills_the_cache_and_reports_its_progress(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     for module in (compiled, kernels):
         monkeypatch.setattr(module, "CACHE", tmp_path / compiled.CACHE.name)

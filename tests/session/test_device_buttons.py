@@ -16,14 +16,14 @@ NOW_S = 7.5
 
 
 def samples(*buttons: int, from_ns: int = 1000, step_ns: int = 1_000_000) -> Any:
-    """Return a sample each millisecond, with these buttons down."""
-    made = np.zeros(len(buttons), [("buttons", np.int64), ("time_ns", np.int64)])
-    made["buttons"], made["time_ns"] = buttons, from_ns + step_ns * np.arange(len(buttons))
-    return made
+    """Return samples with these button states, `step_ns` apart."""
+    records = np.zeros(len(buttons), [("buttons", np.int64), ("time_ns", np.int64)])
+    records["buttons"], records["time_ns"] = buttons, from_ns + step_ns * np.arange(len(buttons))
+    return records
 
 
 def state(phase: Phase, kind: str = "text", answers: tuple[str, ...] | None = None) -> SessionState:
-    """Return what is read of a session: its page, and the answers of a trial with a design."""
+    """Return the parts of a session state that buttons depend on: page and possible answers."""
     pages = {"here": SimpleNamespace(kind=kind)}
     plan = SimpleNamespace(protocol=SimpleNamespace(pages=pages))
     design = None if answers is None else SimpleNamespace(name="which", answers=answers)
@@ -49,7 +49,7 @@ def test_a_press_leaves_a_text_page_and_gives_no_consent() -> None:
         assert events(DeviceButtons(), samples(CONTINUE), state(phase)) == []
 
 
-def test_what_was_pressed_before_the_page_was_there_does_not_count() -> None:
+def test_buttons_pressed_before_the_page_appeared_are_ignored() -> None:
     pressed = samples(0, CONTINUE, CONTINUE, from_ns=0)
     assert events(DeviceButtons(), pressed, state(Phase.READING), since_ns=1_000_001) == []
     assert events(DeviceButtons(), pressed, state(Phase.READING), since_ns=1_000_000) == [Continue(NOW_S)]
@@ -66,11 +66,11 @@ def test_the_stop_button_stops_the_force_whenever_it_is_pressed(phase: Phase) ->
 
 @pytest.mark.parametrize(("button", "answer"), [(LESS, "first"), (MORE, "second")])
 def test_a_choice_between_two_is_made_and_confirmed_by_one_press(button: int, answer: str) -> None:
-    asked = state(Phase.ANSWERING, answers=("first", "second"))
+    answering = state(Phase.ANSWERING, answers=("first", "second"))
     expected = [Chosen(NOW_S, "which", answer), Submitted(NOW_S)]
-    assert events(DeviceButtons(), samples(0, button, 0), asked) == expected
-    assert events(DeviceButtons(), samples(0, LESS, MORE), asked) == [], "both tell nothing"
-    assert events(DeviceButtons(), samples(CONTINUE), asked) == []
+    assert events(DeviceButtons(), samples(0, button, 0), answering) == expected
+    assert events(DeviceButtons(), samples(0, LESS, MORE), answering) == [], "both tell nothing"
+    assert events(DeviceButtons(), samples(CONTINUE), answering) == []
     for other in (
         state(Phase.ANSWERING, answers=("first", "second", "third")),
         state(Phase.ANSWERING),

@@ -8,7 +8,7 @@ MS = 1_000_000
 
 
 def test_frames_are_counted_with_their_errors_and_gaps() -> None:
-    """Painted 5, 12 and 42 ms after the trial was due, showing times 30, 33 and 61 ms earlier, with 30 ms asked for."""
+    """Frames are painted 5, 12 and 42 ms after the due time with ages of 30, 33 and 61 ms; 30 ms are requested."""
     frames = _FrameStatistics(late_s=0.002, due_ns=1_000 * MS)
     assert frames.frame_gap_ns(1_400 * MS) == 0
     for painted_ms, age_ms in ((1_005, 30), (1_012, 33), (1_042, 61)):
@@ -26,7 +26,7 @@ def test_frames_are_counted_with_their_errors_and_gaps() -> None:
 
 
 @pytest.mark.parametrize(("paints", "worst_ms"), [(True, 395), (False, None)])
-def test_without_a_window_a_single_frame_has_no_gap(*, paints: bool, worst_ms: float | None) -> None:
+def test_a_single_frame_without_a_window_has_no_gap(*, paints: bool, worst_ms: float | None) -> None:
     frames = _FrameStatistics(late_s=0.002, due_ns=1_000 * MS, paints=paints)
     frames.frame(1_005 * MS, 1_004 * MS, 0.0)
     columns = frames.columns(1_400 * MS)
@@ -36,7 +36,7 @@ def test_without_a_window_a_single_frame_has_no_gap(*, paints: bool, worst_ms: f
     assert frames.frame_gap_ns(1_400 * MS) == 388 * MS
 
 
-def test_without_a_frame_there_are_no_values() -> None:
+def test_statistics_without_frames_are_empty() -> None:
     columns = _FrameStatistics(late_s=0.002, due_ns=1_000 * MS).columns(1_400 * MS)
     assert columns.pop("frames") == columns.pop("frames_late") == 0
     assert set(columns.values()) == {None}

@@ -34,9 +34,7 @@ from tests.compiled import needs_servo
 from tests.studies import begun
 
 
-def test_a_session_goes_on_with_its_liquids_as_they_were_sealed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_session_continues_with_its_sealed_liquids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study, now, sealed = b'[liquids.oil]\nfile = "oil.toml"\n', {"oil.toml": "now"}, {"oil.toml": "sealed"}
     monkeypatch.setattr(recovery, "locate_session", lambda _: (StudyFolder(tmp_path), None))
     for files, used in ((sealed, sealed), ({}, now)):
@@ -86,7 +84,7 @@ def test_a_liquid_of_a_file_is_felt_with_its_own_ball_and_the_studys_scale(study
     assert "thick" in describe(protocol)
 
 
-def test_the_hash_covers_the_liquid_files_and_nothing_else_changes_it(study: Path) -> None:
+def test_the_protocol_hash_covers_only_the_study_and_its_liquid_files(study: Path) -> None:
     source = source_bytes(study)
     assert StudySource.split(source) == (study.read_bytes(), {"liquids/syrup.toml": SYRUP}, {})
     syrup = study.parent / "liquids" / "syrup.toml"
@@ -107,15 +105,15 @@ def test_a_file_without_liquid_files_is_its_own_source(name: str) -> None:
 
 def test_the_key_of_an_earlier_study_is_drawn_again_but_for_smoothing_times_that_were_left_out(tmp_path: Path) -> None:
     open_or_draw_key(tmp_path, load("rek2024"), stream(1, "blinding").random)
-    drawn, earlier = (
+    key_content, earlier = (
         json.loads(base64.b64decode(StudyFolder(folder).key.read_bytes())) for folder in (tmp_path, EARLIER / "rek2024")
     )
-    for key in (drawn, earlier):
+    for key in (key_content, earlier):
         for name, liquid in key["tables"]["liquids"].items():
             liquid["added_mass"].pop("filter_s")
             liquid["history"].pop("smoothing_s")
             key["tables"]["liquids"][name] = {field: value for field, value in liquid.items() if value is not None}
-    assert drawn == earlier
+    assert key_content == earlier
 
 
 @pytest.mark.parametrize(
@@ -132,16 +130,14 @@ def test_the_key_of_an_earlier_study_is_drawn_again_but_for_smoothing_times_that
         ('file = "liquids/syrup.toml"', SYRUP.replace("[liquids.from", "[study]\n[liquids.from"), "study"),
     ],
 )
-def test_what_is_wrong_with_a_liquid_file_is_one_problem_at_its_line(
-    study: Path, table: str, file: str, said: str
-) -> None:
+def test_an_error_in_a_liquid_file_is_one_problem_at_its_line(study: Path, table: str, file: str, said: str) -> None:
     study.write_text(
         study.read_text("utf-8").replace('file = "liquids/syrup.toml"', table), encoding="utf-8", newline="\n"
     )
     (study.parent / "liquids" / "syrup.toml").write_text(file, encoding="utf-8", newline="\n")
-    with pytest.raises(ProtocolError) as refused:
+    with pytest.raises(ProtocolError) as error:
         load(study)
-    (problem,) = refused.value.problems
+    (problem,) = error.value.problems
     assert said in str(problem)
     lines = study.read_text("utf-8").splitlines()
     assert problem.line is not None
@@ -165,26 +161,26 @@ def test_a_drag_coefficient_may_be_a_liquids_own_and_the_rest_the_scenes() -> No
     assert protocol.scene_for("thin").body == scenes
 
 
-def test_a_ball_of_its_own_is_drawn_as_large_as_it_is_and_warned_of_where_it_tells_a_condition(study: Path) -> None:
-    assert not any("sizes" in one for one in liquid_warnings(load(study)))
+def test_a_liquids_own_ball_is_drawn_at_its_size_with_a_warning_if_it_reveals_a_condition(study: Path) -> None:
+    assert not any("sizes" in warning for warning in liquid_warnings(load(study)))
     syrup = study.parent / "liquids" / "syrup.toml"
     syrup.write_text(SYRUP.replace("diameter_m = 0.068", "diameter_m = 0.04"), encoding="utf-8", newline="\n")
     protocol = load(study)
-    (warned,) = (one for one in liquid_warnings(protocol) if "sizes" in one)
+    (warned,) = (warning for warning in liquid_warnings(protocol) if "sizes" in warning)
     assert "block liquids shows balls of different sizes (40, 68 mm)" in warned
     schedule = build_schedule(protocol, "P001", 1)
     codes = {
         block: dict(zip(block_codes(protocol, protocol.blocks[block]), protocol.blocks[block].conditions, strict=True))
         for block in protocol.blocks
     }
-    drawn = {}
+    ball_sizes = {}
     for index, step in enumerate(schedule.steps):
         if isinstance(step, Trial):
             state = replace(initial_state(protocol, schedule, codes, "en"), index=index, phase=Phase.TASK)
-            shown = build_page(state)
-            assert isinstance(shown, TaskPage)
-            drawn[codes[step.block][step.code]] = shown.body_radius_m
-    assert drawn == pytest.approx({"thin": 0.0034, "thick": 0.002, "prompt": 0.0034, "late": 0.0034})
+            page = build_page(state)
+            assert isinstance(page, TaskPage)
+            ball_sizes[codes[step.block][step.code]] = page.body_radius_m
+    assert ball_sizes == pytest.approx({"thin": 0.0034, "thick": 0.002, "prompt": 0.0034, "late": 0.0034})
 
 
 @pytest.mark.slow
@@ -205,15 +201,15 @@ def test_values_are_sealed_and_a_replay_needs_no_file(study: Path, tmp_path: Pat
 @pytest.mark.slow
 @needs_servo
 @pytest.mark.parametrize("becomes", [None, SYRUP.replace("1387.25", "1100")])
-def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
+def test_an_interrupted_session_continues_with_the_sealed_liquid(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, becomes: str | None
 ) -> None:
-    kept, answered = SessionStore.append, count(1)
+    append, answered = SessionStore.append, count(1)
 
     def interrupted(self: SessionStore, event: Any, **about: Any) -> None:
         if event.event == "responses" and next(answered) == 2:
             raise KeyboardInterrupt
-        kept(self, event, **about)
+        append(self, event, **about)
 
     with monkeypatch.context() as patched:
         patched.setattr(SessionStore, "append", interrupted)
@@ -222,8 +218,8 @@ def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
     session = StudyFolder(tmp_path / "results").session("P001", 1).path
     syrup = tmp_path / "liquids" / "syrup.toml"
     syrup.unlink() if becomes is None else syrup.write_text(becomes, encoding="utf-8", newline="\n")
-    chosen = resumed_choices(session, protocol=str(study))
-    assert chosen.read_protocol().liquids["thick"].density_kg_m3 == 1387.25
+    choices = resumed_choices(session, protocol=str(study))
+    assert choices.read_protocol().liquids["thick"].density_kg_m3 == 1387.25
     assert resumed_choices(session, candidates=["demo", str(study)]).source == str(study)
     rehearsal.resume_rehearsal(session, protocol=str(study))
     assert replay(session).proved

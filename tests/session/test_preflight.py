@@ -100,7 +100,7 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
     *(("small", {"free_bytes": count, "recordings": False}, f"{verdict} Free space: {count / 1e6:.0f} MB free; a "
        "session needs about 60 MB")
       for count, verdict in ((19_000_000, "failure"), (59_000_000, "failure"), (60_500_000, "ok"))),
-    *(("small", {"dynamics": Dynamics(delay_s), "delay_ticks": ticks}, told) for delay_s, ticks, told in (
+    *(("small", {"dynamics": Dynamics(delay_s), "delay_ticks": ticks}, expected) for delay_s, ticks, expected in (
         (None, 1, "ok Loop delay: 1 tick; assumed"),
         (0.00093, 1, "ok Loop delay: 1 tick; a force takes effect after 0.93 ms"),
         (0.0018, 2, "warning Loop delay: 2 ticks; a force takes effect after 1.80 ms"),
@@ -112,14 +112,14 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
       for name, of_each in (("small", ""), ("single-blind", ": thick {} %, thin 0.1 %"))
       for share, percent, verdict in ((0.032, "3.2", "ok"), (0.05, "5.0", "ok"), (0.051, "5.1", "warning"))),
     *(("small", {"delivery": PredictedDelivery(missing=missing, asked=asked, out=out, judged=5, limit_percent=25)},
-       f"{told}; predicted for a delay of 1 tick") for missing, asked, out, told in (
+       f"{expected}; predicted for a delay of 1 tick") for missing, asked, out, expected in (
         (0, 40, 0, "ok Trials delivered: all"),
         (26, 40, 0, "warning Trials delivered: 26 of 45 trials beyond the limit"),
         (1, 1, 2, "warning Trials delivered: 3 of 6 trials beyond the limit"),
         (0, 0, 1, "warning Trials delivered: 1 of 5 trials beyond the limit"))),
     *(("small", {"tick_s": tick_s}, f"{verdict} Scene cost: {1e9 * tick_s:.0f} ns per tick")
       for tick_s, verdict in ((1e-4, "ok"), (2e-4, "ok"), (2.01e-4, "warning"))),
-    *(("small", {"outlets": (one,)}, told) for one, told in (
+    *(("small", {"outlets": (outlet,)}, expected) for outlet, expected in (
         (LIVE, "ok LSL markers: listener"), (replace(LIVE, listens=False), "warning LSL markers: no listener"),
         (OutletStatus(title="LSL samples", withheld=True), "ok LSL samples: off; because the study is double-blind"),
         (OutletStatus(title="LSL samples", listens=True, shows_force=True), "warning LSL samples: listener"),
@@ -130,9 +130,9 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
      "01234567"),
     ("small", {"key_hash": None}, "ok Blinding: double-blind; the key is generated"),
     *(("small", {"device": device, "dynamics": dynamics, "velocity_errors": errors},
-       f"{told}{unknown}" if device != "mouse" else "")
+       f"{expected}{unknown}" if device != "mouse" else "")
       for device in ("force-dimension:7", "mouse")
-      for dynamics, errors, told, unknown in (
+      for dynamics, errors, expected, unknown in (
         (UNKNOWN, (0.121, 0.0101), "warning Velocity: 12 % instead of 1 %; error at 2 Hz, because the device's ",
          "delay, encoder count and mass are unknown"),
         (Dynamics(1e-3, assumed=("mass_kg",)), (0.01, 0.01), "ok Velocity: 1 %; error at 2 Hz, although the device's ",
@@ -147,8 +147,8 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
        f"Levels: up to {highest} N·s/m; with a delay of {ticks} tick")
       for name, highest in (("dampers", "25.6"), ("delays", "30")) for ticks in (1, 2, 3, 4)),
     *(("delays", {"dynamics": Dynamics(mass_kg=mass_kg)},
-       f"{told}; the study delays forces at 1000 Hz, with a handle of {grams} g")
-      for mass_kg, grams, told in (
+       f"{expected}; the study delays forces at 1000 Hz, with a handle of {grams} g")
+      for mass_kg, grams, expected in (
         (0.0994, 99, "failure Delayed force: not permitted"), (0.1, 100, "ok Delayed force: permitted"))),
     ("fast delays", timing(1001.0), "failure Delayed force: not permitted; the study delays forces at 1001 Hz, with"),
 )  # fmt: skip
@@ -156,14 +156,16 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
 
 def test_both_sides_of_each_limit() -> None:
     known = studies()
-    for name, changed, told in FACTS:
-        found = preflight_checks(replace(small.WELL, **changed), known[name])
-        checks = ["{verdict} {name}: {value}; {about}".format(**check.entry) for check in found]
-        assert [line.startswith(told) for line in checks].count(True) == 1 if told else "Velocity" not in str(checks), (
-            f"{changed} is not told as {told!r}: {checks}"
-        )
-        assert bool(refusal_reasons(found)) == told.startswith("failure"), changed
-        shares = {check.name: check for check in found if check.share is not None and check.name != "Scene cost"}
+    for name, changed, expected in FACTS:
+        found_checks = preflight_checks(replace(small.WELL, **changed), known[name])
+        checks = ["{verdict} {name}: {value}; {about}".format(**check.entry) for check in found_checks]
+        assert (
+            [line.startswith(expected) for line in checks].count(True) == 1
+            if expected
+            else "Velocity" not in str(checks)
+        ), f"{changed} is not told as {expected!r}: {checks}"
+        assert bool(refusal_reasons(found_checks)) == expected.startswith("failure"), changed
+        shares = {check.name: check for check in found_checks if check.share is not None and check.name != "Scene cost"}
         assert all((check.share > 1) == (check.verdict == "warning") for check in shares.values()), changed
 
 
@@ -235,8 +237,8 @@ WARNINGS: tuple[tuple[str, str, str, str, str, float | None], ...] = (
 
 
 def test_each_warning_and_failure_has_its_explanation_and_its_remedy() -> None:
-    measured = replace(small.WELL, **ALL_WRONG, **timing(700.0, p99_s=5e-3, gap_s=60e-3, late=9))
-    checks = preflight_checks(measured, studies()["dealt"])
+    facts = replace(small.WELL, **ALL_WRONG, **timing(700.0, p99_s=5e-3, gap_s=60e-3, late=9))
+    checks = preflight_checks(facts, studies()["dealt"])
     assert [
         (check.verdict, check.name, check.value, check.about, check.advice, check.share and pytest.approx(check.share))
         for check in checks
@@ -246,19 +248,19 @@ def test_each_warning_and_failure_has_its_explanation_and_its_remedy() -> None:
         "free space: 19 MB free, a session needs about 64 MB: free up some disk space; video: no camera is connected"
     )
     assert str(checks[7]) == "warning  Results folder  250.0 ms; time to write a file; Use a local disk."
-    unknown = replace(measured, probe_s=None, probe_fault="it is read-only", free_bytes=None, late_device=LATE)
-    told = {check.name: (check.verdict, check.about, check.advice) for check in preflight_checks(
+    unknown = replace(facts, probe_s=None, probe_fault="it is read-only", free_bytes=None, late_device=LATE)
+    checks_by_name = {check.name: (check.verdict, check.about, check.advice) for check in preflight_checks(
         replace(unknown, video=VideosFound("a camera of 30 Hz")), studies()["dealt"])}  # fmt: skip
-    assert told["Results folder"] == ("failure", "no file could be written", "it is read-only")
-    assert told["Free space"][::2] == ("warning", "The operating system does not report the free space.")
-    assert told["Loop delay"][2] == (
+    assert checks_by_name["Results folder"] == ("failure", "no file could be written", "it is read-only")
+    assert checks_by_name["Free space"][::2] == ("warning", "The operating system does not report the free space.")
+    assert checks_by_name["Loop delay"][2] == (
         f"{LATE}; connect the device without a hub, then measure it: liquid-study devices bench force-dimension:7."
     )
-    assert told["Video"] == ("ok", "a camera of 30 Hz", "")
+    assert checks_by_name["Video"] == ("ok", "a camera of 30 Hz", "")
 
 
 @pytest.mark.parametrize(("study", "needed"), [("rek2024", 209), ("thickness", 124)])
-def test_a_session_needs_what_its_sealed_recordings_take(study: str, needed: int) -> None:
+def test_the_free_space_check_counts_sealed_recordings(study: str, needed: int) -> None:
     """A trial of 3 s is sealed into the room of 4 s, whatever its page and its questions take."""
     (room,) = [check for check in preflight_checks(small.WELL, load(study)) if check.name == "Free space"]
     assert room.about == f"a session needs about {needed} MB"
@@ -278,10 +280,10 @@ def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded:
     place.path.mkdir(parents=True)
     ran = {"key_hash": "", "protocol_hash": recorded, "protocol": {"study": {"version": version}}}
     receipt.write(place.receipt, ran)
-    chosen = replace(small.CHOSEN, source="rek2024", participant="P002", results=tmp_path)
-    assert participant_with_other_contents(chosen) == who
-    found = preflight_checks(replace(small.WELL, ran_otherwise=who), study)
-    assert [check.verdict for check in found if check.name == "Study file"] == ["warning"] * bool(who)
+    choices = replace(small.CHOSEN, source="rek2024", participant="P002", results=tmp_path)
+    assert participant_with_other_contents(choices) == who
+    checks = preflight_checks(replace(small.WELL, ran_otherwise=who), study)
+    assert [check.verdict for check in checks if check.name == "Study file"] == ["warning"] * bool(who)
 
 
 RIG: Any = SimpleNamespace(
@@ -299,13 +301,13 @@ def test_a_bench_test_shows_that_a_device_is_late(
     """At 500 Hz, two ticks more than assumed, 3 ticks, are 6 ms; delays from 5 ms on are rounded to them."""
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path))
     three = (0.2, 0.2, 0.2)
-    measured = DeviceBench(
+    facts = DeviceBench(
         name="mouse", serial="7", measured="2026-11-21", mass_kg=three, damping_nspm=three, friction_n=three,
         delay_ms=delay_ms, stable_nspm=three,
     )  # fmt: skip
-    save_settings(DEFAULTS.with_bench(measured))
-    told = f"In the bench test of 2026-11-21, the device answered after {ticks} ticks, but the servo assumes 1 tick"
-    assert late_device_sentence(RIG, StudyFolder(tmp_path / "study"), "double") == (told if ticks else "")
+    save_settings(DEFAULTS.with_bench(facts))
+    message = f"In the bench test of 2026-11-21, the device answered after {ticks} ticks, but the servo assumes 1 tick"
+    assert late_device_sentence(RIG, StudyFolder(tmp_path / "study"), "double") == (message if ticks else "")
 
 
 def hold_session(folder: StudyFolder, who: str, delays: tuple[int | None, ...]) -> None:
@@ -314,8 +316,8 @@ def hold_session(folder: StudyFolder, who: str, delays: tuple[int | None, ...]) 
         for number, ticks in enumerate(delays, start=1):
             which: dict[str, Any] = {"block": "feeling", "phase": "main", "part": 1, "of": len(delays), "code": "L1"}
             store.append(TrialStarted(trial=number, attempt=1, index=number, **which))
-            measured = {"loop_delay_ticks": 1, "device_delay_ticks": ticks}
-            store.append(event_of("trial_ended", trial=number, attempt=1, outcome="complete", **measured))
+            facts = {"loop_delay_ticks": 1, "device_delay_ticks": ticks}
+            store.append(event_of("trial_ended", trial=number, attempt=1, outcome="complete", **facts))
         store.finish("aborted")
 
 
@@ -324,18 +326,22 @@ def test_the_last_session_shows_that_a_device_is_late(tmp_path: Path, monkeypatc
     folder = StudyFolder(tmp_path / "small")
     assert late_device_sentence(RIG, folder, "single") == ""
     hold_session(folder, "P002", (None, 3, None, 5, None))
-    told = "the device answered after 5 ticks, but the servo assumes 1 tick"
-    assert late_device_sentence(RIG, folder, "single") == f"In trial 4 of the last session (participant P002), {told}"
+    message = "the device answered after 5 ticks, but the servo assumes 1 tick"
+    assert (
+        late_device_sentence(RIG, folder, "single") == f"In trial 4 of the last session (participant P002), {message}"
+    )
     assert late_device_sentence(RIG, folder, "double") == ""
     unblind(folder.path, "AK", "end of the study")
-    assert late_device_sentence(RIG, folder, "double") == f"In trial 4 of the last session (participant P002), {told}"
+    assert (
+        late_device_sentence(RIG, folder, "double") == f"In trial 4 of the last session (participant P002), {message}"
+    )
     hold_session(folder, "P001", (None, None))
     assert late_device_sentence(RIG, folder, "single") == ""
 
 
 @pytest.mark.parametrize(("language", "told"), [("fr", "4 texts; still in English"), ("en", "")])
 def test_pages_in_two_languages_are_a_warning(language: str, told: str) -> None:
-    """What participants read of it: an instruction, a title, a text and a question; the study's title they do not."""
+    """Participants read an instruction, a title, a text and a question, but not the study's title."""
     text = source_bytes("delayjnd").decode()
     assert "languages = " not in text
     document = read_document(text.replace("[study]", f'[study]\nlanguages = ["{language}"]').encode(), "")[0]
@@ -344,7 +350,7 @@ def test_pages_in_two_languages_are_a_warning(language: str, told: str) -> None:
     assert [sentence.split("; Pages")[0] for sentence in warned] == ([told] if told else [])
 
 
-def measured(results: Path) -> Measurements:
+def measure_facts(results: Path) -> Measurements:
     device = ScriptedDevice()
     with device, Servo(device, clock=VirtualClock(), elements=10) as servo:
         return measure_servo_and_disk(
@@ -360,12 +366,12 @@ def measured(results: Path) -> Measurements:
 
 
 def void(_: object) -> None:
-    """Drop what a call returned."""
+    """Return None instead of the result of a call."""
 
 
 @needs_servo
-def test_servo_and_disk_are_measured_and_nothing_is_left(tmp_path: Path) -> None:
-    facts = measured(tmp_path / "not" / "yet")
+def test_the_measurement_of_servo_and_disk_leaves_no_file(tmp_path: Path) -> None:
+    facts = measure_facts(tmp_path / "not" / "yet")
     assert facts.timing.rate_hz == pytest.approx(1000, rel=1e-3)
     assert facts.fresh_share == 1.0
     assert (facts.dynamics.delay_s, facts.delay_ticks) == (0.0, 0)
@@ -386,16 +392,16 @@ def test_the_sample_age_is_that_of_all_but_a_twentieth(tmp_path: Path, monkeypat
         return sample
 
     monkeypatch.setattr(Telemetry, "latest", late)
-    assert measured(tmp_path).sample_age_s == pytest.approx(0.018, abs=0.0015)
+    assert measure_facts(tmp_path).sample_age_s == pytest.approx(0.018, abs=0.0015)
 
 
 @needs_servo
-def test_a_disk_that_takes_nothing_is_a_failure_with_its_reason(
+def test_an_unwritable_disk_fails_the_preflight_with_its_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(_folder: Path) -> int:
         raise StoreError("the disk is full")
 
     monkeypatch.setattr(preflight_measurements, "probe_free_bytes", full)
-    facts = measured(tmp_path)
+    facts = measure_facts(tmp_path)
     assert "the disk is full" in refusal_reasons(preflight_checks(facts, small.protocol()))

@@ -22,7 +22,7 @@ from tests.session.transitions.transcribed import opened
 
 def test_pages_between_the_trials_say_which_part_it_is_and_how_far() -> None:
     state = opened(load("rek2024"))
-    told: dict[str, Progress | None] = {}
+    progress_of_page: dict[str, Progress | None] = {}
     while state.phase not in FINAL:
         if state.phase is Phase.TASK:
             event: Any = TaskDone(100.0, "complete", {})
@@ -31,8 +31,8 @@ def test_pages_between_the_trials_say_which_part_it_is_and_how_far() -> None:
         state, commands = advance(state, event)
         page = shown(commands)
         if isinstance(page, TextPage):
-            told[page.id] = page.progress
-    assert told == {
+            progress_of_page[page.id] = page.progress
+    assert progress_of_page == {
         "consent": None,
         "instructions": None,
         "part_1": Progress(part=1, parts=2, label="", index=1, of=3),
@@ -80,13 +80,13 @@ def test_the_rows_of_the_trial_and_of_its_repetition_say_that_the_device_failed(
 @pytest.mark.parametrize(
     "what", [FAULT, "one of the study's videos stopped (no frame arrived for 1 s): check the camera and the files"]
 )
-def test_in_a_study_with_videos_journal_and_tables_do_not_say_what_failed(what: str) -> None:
-    """Only some conditions show a video, so that its failure tells what a code stands for."""
+def test_journal_and_tables_of_a_study_with_videos_do_not_name_the_failed_part(what: str) -> None:
+    """Only some conditions show a video, so that its failure reveals the condition of a code."""
     state = state_in(Phase.TASK)
     first, *others = state.plan.protocol.conditions
     conditions = state.plan.protocol.conditions
-    seen = {**conditions, first: conditions[first].model_copy(update={"view": "camera"})}
-    protocol = state.plan.protocol.model_copy(update={"conditions": seen})
+    with_view = {**conditions, first: conditions[first].model_copy(update={"view": "camera"})}
+    protocol = state.plan.protocol.model_copy(update={"conditions": with_view})
     assert others
     state = replace(state, plan=replace(state.plan, protocol=protocol))
     trouble, commands = advance(state, Broke(20.0, what, "device"))
@@ -97,5 +97,5 @@ def test_in_a_study_with_videos_journal_and_tables_do_not_say_what_failed(what: 
 
 
 def fields_of(commands: Sequence[Command], event: str) -> Mapping[str, Any]:
-    (written,) = [one for one in commands if isinstance(one, Write) and one.line.event == event]
-    return written.line.fields()
+    (write,) = [command for command in commands if isinstance(command, Write) and command.line.event == event]
+    return write.line.fields()

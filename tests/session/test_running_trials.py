@@ -24,7 +24,7 @@ DELAY_S = 0.1
 PERIOD_NS = 33_000_000
 
 
-def begun(task: Any, recorder: Any = None, **more: Any) -> tuple[RunningTrial, FakeServo]:
+def begin_trial(task: Any, recorder: Any = None, **more: Any) -> tuple[RunningTrial, FakeServo]:
     """Return a trial whose first frame has not been painted, after half a second of samples."""
     servo = FakeServo([])
     servo.run(0.5)
@@ -42,29 +42,29 @@ def begun(task: Any, recorder: Any = None, **more: Any) -> tuple[RunningTrial, F
 
 def painted(task: Any, *, hides_ball: bool) -> tuple[RunningTrial, FakeServo]:
     """Return a trial whose first frame was painted."""
-    trial, servo = begun(task, hides_ball=hides_ball)
+    trial, servo = begin_trial(task, hides_ball=hides_ball)
     trial.frame(servo.now_ns(), servo.now_ns())
     return trial, servo
 
 
 def hidden_after(trial: RunningTrial, servo: FakeServo, seconds: float) -> list[tuple[float, bool]]:
     """Return (elapsed time that is drawn, whether the ball is hidden) every 10 ms."""
-    seen = []
+    is_hidden = []
     for _ in range(round(seconds * 100)):
         servo.run(0.01)
         trial.follow(servo.telemetry.read())
         view = trial.view(servo.now_ns())
-        seen.append((view.task.elapsed_s, view.ball_hidden))
-    return seen
+        is_hidden.append((view.task.elapsed_s, view.ball_hidden))
+    return is_hidden
 
 
 @pytest.mark.slow
 def test_a_hidden_ball_is_drawn_during_the_lead_and_not_after_it() -> None:
     trial, servo = painted(SWING, hides_ball=True)
-    seen = hidden_after(trial, servo, 5.0)
-    assert {hidden for elapsed_s, hidden in seen if elapsed_s < SWING.lead_s} == {False}
-    assert {hidden for elapsed_s, hidden in seen if elapsed_s >= SWING.lead_s} == {True}
-    newest_s = seen[150][0]
+    is_hidden = hidden_after(trial, servo, 5.0)
+    assert {hidden for elapsed_s, hidden in is_hidden if elapsed_s < SWING.lead_s} == {False}
+    assert {hidden for elapsed_s, hidden in is_hidden if elapsed_s >= SWING.lead_s} == {True}
+    newest_s = is_hidden[150][0]
     assert newest_s == pytest.approx(1.51 - DELAY_S - SETTLED_S, abs=0.0021)  # hidden as late as it is drawn
 
 
@@ -76,9 +76,9 @@ def test_without_a_lead_a_hidden_ball_is_never_drawn() -> None:
 def test_the_target_is_drawn_where_it_was() -> None:
     trial, servo = painted(SWING, hides_ball=True)
     hidden_after(trial, servo, 2.0)
-    drawn: TaskView = trial.view(servo.now_ns()).task
-    assert drawn.target_m == pytest.approx(SWING.target_m(drawn.elapsed_s))
-    assert trial.task.elapsed_s - drawn.elapsed_s == pytest.approx(DELAY_S + SETTLED_S, abs=0.0011)
+    task_view: TaskView = trial.view(servo.now_ns()).task
+    assert task_view.target_m == pytest.approx(SWING.target_m(task_view.elapsed_s))
+    assert trial.task.elapsed_s - task_view.elapsed_s == pytest.approx(DELAY_S + SETTLED_S, abs=0.0011)
 
 
 def test_a_task_is_over_when_its_end_was_drawn_with_the_longest_delay() -> None:
@@ -92,7 +92,7 @@ def test_a_task_is_over_when_its_end_was_drawn_with_the_longest_delay() -> None:
     assert trial.outcome() == "complete"
 
 
-def test_a_trial_counts_its_own_samples_up_to_its_end_and_no_glitch() -> None:
+def test_a_trial_counts_only_its_own_samples_without_glitches() -> None:
     """The first second belongs to the scene before; the task ends after 1 s, and a refused sample moves no ball."""
     trial, servo = painted(Explore(kind="explore", instruction="Move", min_s=1, max_s=1), hides_ball=False)
     assert trial.follow(servo.telemetry.read()) == []
@@ -115,7 +115,7 @@ def test_a_trial_counts_its_own_samples_up_to_its_end_and_no_glitch() -> None:
 
 
 def test_a_trial_is_frozen_by_a_gap_of_more_than_a_second_in_ticks_or_frames() -> None:
-    trial, servo = begun(TASK)
+    trial, servo = begin_trial(TASK)
     servo.worst_gap_s = 1.5
     assert not trial.frozen, "it has not begun"
     trial.frame(servo.now_ns(), servo.now_ns())
@@ -142,7 +142,7 @@ def test_a_rest_draws_the_ball_as_it_is_and_the_target_at_its_start(task: Any, l
 
 
 def test_a_level_is_adjusted_from_the_first_frame_until_the_time_is_over() -> None:
-    trial, servo = begun(TASK)
+    trial, servo = begin_trial(TASK)
     adjusting = replace(trial.command, adjusts=True, task=TASK.model_copy(update={"min_s": 0.5, "max_s": 1.5}))
     trial = RunningTrial(
         adjusting, Scene(), late_s=0.05, servo=servo, reader=servo.telemetry.reader(),
@@ -179,7 +179,7 @@ def test_a_force_is_compared_with_its_law_unless_it_is_late_or_set(
     link: ForceLink, adjusts: bool, has_error: bool
 ) -> None:
     scene = small.protocol().scene_for("is_thick")
-    trial, servo = begun(TASK)
+    trial, servo = begin_trial(TASK)
     trial = RunningTrial(
         replace(trial.command, adjusts=adjusts), scene.model_copy(update={"link": link}), late_s=0.05, servo=servo,
         reader=servo.telemetry.reader(), recording=Recording(None, servo.rate_hz), paints=False,
@@ -243,7 +243,7 @@ class Recorded:
 
 def test_the_video_is_as_late_as_the_ball_and_both_are_recorded() -> None:
     video, recorder = FakeVideo(), Recorded()
-    trial, servo = begun(TASK, recorder, video=video, videos=True)
+    trial, servo = begin_trial(TASK, recorder, video=video, videos=True)
     assert video.calls == ["rewind"]
     view = trial.view(servo.now_ns())
     asked_ns = servo.now_ns() - round((DELAY_S + SETTLED_S) * 1e9)
@@ -264,7 +264,7 @@ def test_the_video_is_as_late_as_the_ball_and_both_are_recorded() -> None:
     assert columns["video_age_mean_ms"] == 7.0
 
 
-def test_a_recording_begins_with_the_samples_since_the_servo_began_at_most_600() -> None:
+def test_a_recording_includes_up_to_600_samples_from_before_its_start() -> None:
     recorder = Recorded()
     recording, at = Recording(recorder, 1000.0), iter(range(100_000))
     for counts, expected in (((1, 7), 8), ((400, 150, 170, 90), 600), ((), 600), ((601,), 600)):
@@ -283,8 +283,8 @@ def test_a_recording_begins_with_the_samples_since_the_servo_began_at_most_600()
     assert recorder.samples == [7, 8, 9]
 
 
-def test_a_trial_without_a_video_has_no_numbers_of_one() -> None:
-    trial, servo = begun(TASK, Recorded(), videos=True)
+def test_a_trial_without_a_video_has_empty_video_columns() -> None:
+    trial, servo = begin_trial(TASK, Recorded(), videos=True)
     view = trial.view(servo.now_ns())
     trial.frame(servo.now_ns(), view.sample_time_ns)
     assert view.video is None
@@ -296,13 +296,13 @@ def test_a_camera_that_stops_stops_the_trial() -> None:
         def frame_at(self, moment_ns: int) -> VideoFrame | None:
             raise VideoError("the camera stopped")
 
-    trial, servo = begun(TASK, Recorded(), video=Stopped(), videos=True)
+    trial, servo = begin_trial(TASK, Recorded(), video=Stopped(), videos=True)
     with pytest.raises(VideoError, match="the camera stopped"):
         trial.view(servo.now_ns())
 
 
 def test_late_and_lost_frames_are_counted_once_each() -> None:
-    counted = VideoStatistics()
+    statistics = VideoStatistics()
     delay_ns = round(DELAY_S * 1e9)
     painted = (  # number, how late beyond the delay [ns]
         (3, 0),
@@ -313,8 +313,8 @@ def test_late_and_lost_frames_are_counted_once_each() -> None:
         (8, 3 * PERIOD_NS),
     )
     for number, late_ns in painted:
-        counted.frame(number * PERIOD_NS + delay_ns + late_ns, frame(number, number * PERIOD_NS), DELAY_S)
-    assert counted.columns() == {
+        statistics.frame(number * PERIOD_NS + delay_ns + late_ns, frame(number, number * PERIOD_NS), DELAY_S)
+    assert statistics.columns() == {
         "video_frames": 4,
         "video_frames_late": 2,
         "video_frames_lost": 2,
@@ -325,8 +325,8 @@ def test_late_and_lost_frames_are_counted_once_each() -> None:
 
 @pytest.mark.parametrize(("adjusts", "calls"), [(True, [1.5 + _MIN_SETTING_S]), (False, ["left"])])
 def test_a_level_is_set_for_a_moment_before_it_can_be_left(adjusts: bool, calls: list[Any]) -> None:
-    told: list[Any] = []
-    tracker = SimpleNamespace(finish=told.append, leave=lambda: told.append("left"))
+    pressed: list[Any] = []
+    tracker = SimpleNamespace(finish=pressed.append, leave=lambda: pressed.append("left"))
     command = SimpleNamespace(adjusts=adjusts, task=SimpleNamespace(judged_from_s=1.5))
     RunningTrial.leave(cast(Any, SimpleNamespace(command=command, _tracker=tracker)))
-    assert told == calls
+    assert pressed == calls

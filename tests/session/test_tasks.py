@@ -39,23 +39,27 @@ def explore(min_s: float = 1.0, max_s: float = 3.0) -> Explore:
 
 
 class Played:
-    """A task that is followed, and a command for whatever happens to it."""
+    """A tracked task with a command for each event."""
 
     def __init__(self, task: Any) -> None:
         self.tracker = new_tracker(task)
 
     def stay(self, begin: float, end: float, place: Any) -> Iterator[str]:
-        """Let samples of 1 kHz come, at a place from one time [s] until just before another."""
+        """Feed 1 kHz samples at a position from one time [s] until just before another."""
         times = np.arange(round(begin * 1000), round(end * 1000)) / 1000
-        found = self.tracker.feed(samples(times, np.tile(place, (len(times), 1))))
-        yield from (f"reached {one.target} after {one.t_task_s:g} s" for one in found)
+        reaches = self.tracker.feed(samples(times, np.tile(place, (len(times), 1))))
+        yield from (f"reached {reach.target} after {reach.t_task_s:g} s" for reach in reaches)
         if self.tracker.done:
             yield f"{self.tracker.outcome} at {self.tracker.end_ns / 1e9:g} s: {self.tracker.summary()}"
 
     def seen(self, at_s: float) -> Iterator[str]:
-        """Tell what was to be seen at a time."""
+        """Yield the view of the task at a time."""
         view = self.tracker.at(round(at_s * 1e9))
-        target = "" if view.target_m is None else f", target at {[round(1000 * each, 3) for each in view.target_m]} mm"
+        target = (
+            ""
+            if view.target_m is None
+            else f", target at {[round(1000 * coordinate_m, 3) for coordinate_m in view.target_m]} mm"
+        )
         yield f"lit {view.lit}, {view.reached} of {view.of}, dwell {view.dwell:.4g}, {view.elapsed_s:.4g} s{target}"
 
     def leave(self) -> Iterator[str]:
@@ -69,13 +73,13 @@ def begun(start: str) -> Played:
 PLACES = {"LEFT": LEFT, "RIGHT": RIGHT, "AWAY": AWAY, "BORDER": BORDER, "BEYOND": BEYOND, "NOWHERE": NOWHERE}
 
 
-def test_what_happens_in_a_task(pytestconfig: pytest.Config) -> None:
+def test_events_of_each_task_are_as_recorded(pytestconfig: pytest.Config) -> None:
     file = Path(__file__).parent / "golden" / "tasks.txt"
     compare(file, played(file, acts(begun, PLACES)), pytestconfig)
 
 
 def stay(tracker: Tracker, begin_s: float, end_s: float, place: Any) -> list[tuple[int, float]]:
-    """Let samples of 1 kHz come, at a place; return the targets reached, and when."""
+    """Feed 1 kHz samples at a position; return the reached targets and their times."""
     times = np.arange(round(begin_s * 1000), round(end_s * 1000)) / 1000
     reached = tracker.feed(samples(times, np.tile(place, (len(times), 1))))
     return [(target.target, round(target.t_task_s, 9)) for target in reached]
@@ -107,7 +111,7 @@ def test_targets_light_up_in_turn_and_each_moment_is_drawn_as_it_was() -> None:
     assert tracker.now() == TaskView(lit=None, reached=3, of=3, dwell=0.0, elapsed_s=0.9)
 
 
-def test_a_radius_is_measured_in_all_directions_and_no_dwell_closes_no_ring() -> None:
+def test_the_radius_is_measured_in_all_directions_and_a_zero_dwell_draws_no_ring() -> None:
     tracker = new_tracker(reach(dwell_s=0.0, count=None, duration_s=1.0))
     assert stay(tracker, 2.0, 2.1, (-0.02, 0.004, 0.0031)) == []
     assert stay(tracker, 2.1, 2.2, (-0.02, 0.0, -0.0051)) == stay(tracker, 2.2, 2.3, NOWHERE) == []
@@ -154,21 +158,21 @@ def test_a_moving_target_is_drawn_where_it_was() -> None:
 
 
 def slowly(task: Reach, rows: Any) -> tuple[list[tuple[int, int]], tuple[str | None, int | None]]:
-    """Return what is reached and when, and how and when the task ends, sample by sample in plain Python."""
-    start, reached, entered, found = int(rows.time_ns[0]), 0, None, []
+    """Return the reached targets with their times, and the end of the task, computed sample by sample."""
+    start, reached, entered, reaches = int(rows.time_ns[0]), 0, None, []
     for row in rows:
         time = int(row.time_ns)
         target = task.targets_m[reached % len(task.targets_m)]
         inside = sum((a - b) ** 2 for a, b in zip(row.position_m.tolist(), target, strict=True)) <= task.radius_m**2
         entered = (time if entered is None else entered) if inside else None
         if entered is not None and time - entered >= round(task.dwell_s * 1e9):
-            found.append((reached % len(task.targets_m), time - start))
+            reaches.append((reached % len(task.targets_m), time - start))
             reached, entered = reached + 1, None
         if reached == task.count:
-            return found, ("complete", time)
+            return reaches, ("complete", time)
         if time - start >= round(task.timeout_s * 1e9):
-            return found, ("timeout", time)
-    return found, (None, None)
+            return reaches, ("timeout", time)
+    return reaches, (None, None)
 
 
 @pytest.mark.slow
@@ -185,9 +189,9 @@ def test_however_the_samples_are_cut_the_result_is_that_of_one_at_a_time(
     task = reach(dwell_s=dwell_s, count=count, timeout_s=0.3)
     places = [place for length, place in visits for _ in range(length)]
     rows = samples(np.arange(len(places)) / 1000 + 7, places)
-    tracker, found, first = new_tracker(task), [], 0
+    tracker, reaches, first = new_tracker(task), [], 0
     for cut in [*cuts, len(rows)]:
-        found += tracker.feed(rows[first : first + cut])
+        reaches += tracker.feed(rows[first : first + cut])
         first += cut
-    came = [(reached.target, round(reached.t_task_s * 1e9)) for reached in found]
+    came = [(reached.target, round(reached.t_task_s * 1e9)) for reached in reaches]
     assert (came, (tracker.outcome, tracker.end_ns)) == slowly(task, rows)

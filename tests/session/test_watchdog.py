@@ -21,8 +21,8 @@ SEEN_WITHIN_S = 0.1
 
 @pytest.fixture
 def bench() -> Iterator[Bench]:
-    with small_bench() as made:
-        yield made
+    with small_bench() as new_bench:
+        yield new_bench
 
 
 def frames(bench: Bench, ticks: int) -> Any:
@@ -83,7 +83,7 @@ def test_a_servo_that_faults_is_seen_within_100_ms_and_its_trial_is_marked(bench
 
 
 def forces_of_six_seconds(*, frozen: bool) -> Any:
-    """Return the forces (n, 3) [N] of one hand, looked at every frame, or not at all for 5 s in the middle."""
+    """Return the forces (n, 3) [N] of one hand, with windows that update every frame or freeze for 5 s."""
     with small_bench() as bench:
         servo, reader = bench.servo, bench.servo.telemetry.reader()
         frames(bench, 800)
@@ -98,7 +98,7 @@ def forces_of_six_seconds(*, frozen: bool) -> Any:
 
 
 @pytest.mark.slow
-def test_windows_that_stand_still_for_five_seconds_change_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_windows_frozen_for_five_seconds_do_not_change_the_force(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(small.TABLES["tasks"]["explore"], "max_s", 20)
     frozen, watched = forces_of_six_seconds(frozen=True), forces_of_six_seconds(frozen=False)
     assert len(frozen) == len(watched) == 6128

@@ -45,7 +45,7 @@ def test_a_moment_has_the_newest_sample_the_interpolated_hand_and_the_frame_that
 def test_marks_are_on_the_clock_of_the_task_which_begins_with_the_first_frame() -> None:
     which = {"trial": 4, "attempt": 1}
     ended: Any = event_of("trial_ended", n=8, t_s=104.0, outcome="complete", first_frame_gap_ms=250.0, **which)
-    begun, *lines = (
+    start_line, *lines = (
         event_of("trial_started", n=3, t_s=100.0, **which),
         event_of("note", n=2, t_s=100.5, kind="note", text="before"),
         event_of("paused", n=4, t_s=101.0, by="operator"),
@@ -55,7 +55,7 @@ def test_marks_are_on_the_clock_of_the_task_which_begins_with_the_first_frame() 
         ended,
         event_of("note", n=9, t_s=110.0, kind="note", text="of the next interval"),
     )
-    assert list(watch._marks(lines, begun, ended, 110.0)) == [
+    assert list(watch._marks(lines, start_line, ended, 110.0)) == [
         Mark(0.75, "event", "paused"), Mark(1.7, "target", "target 3 reached"), Mark(2.75, "answer", "thick: 5"),
         Mark(3.75, "event", "task ended: complete"),
     ]  # fmt: skip
@@ -82,11 +82,11 @@ def test_times_begin_with_the_scene_of_the_task_before_its_adjustments(last: boo
 
 def test_the_contents_are_named_once_the_study_is_unblinded() -> None:
     key: Any = SimpleNamespace(condition=lambda block, code: f"{block} {code}")
-    started: Any = SimpleNamespace(block="stir", code="L2", arrangement="CS")
-    assert [watch._presented_condition(started, number, key) for number in (None, 1, 2)] == [
+    fields: Any = SimpleNamespace(block="stir", code="L2", arrangement="CS")
+    assert [watch._presented_condition(fields, number, key) for number in (None, 1, 2)] == [
         "stir L2", "comparison", "standard",
     ]  # fmt: skip
-    assert [watch._presented_condition(started, number, None) for number in (None, 1)] == ["", ""]
+    assert [watch._presented_condition(fields, number, None) for number in (None, 1)] == ["", ""]
 
 
 OTHERS = {"duration_s": 2.0, "first_frame_gap_ms": 0.0}
@@ -118,16 +118,16 @@ NAMES = {f"{attempt}-{number}": attempt * 10 + number for attempt in (1, 2) for 
 def session(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """Return a session with two attempts at a trial of two intervals; each recording has its own scene and place."""
     key = SimpleNamespace(nonce=b"secret", condition=lambda block, code: f"{block} {code}")
-    made = SimpleNamespace(path=Path("ses"), journal=LINES, receipt=None, key=key, has_frames=True)
+    session_files = SimpleNamespace(path=Path("ses"), journal=LINES, receipt=None, key=key, has_frames=True)
 
     def samples(path: Path, secret: bytes | None) -> Any:
-        assert secret == (None if made.key is None else b"secret")
+        assert secret == (None if session_files.key is None else b"secret")
         scene = NAMES[path.name]
         places_m = [(scene * 1e-3, 0.0, 0.0)] * 5
         return small.samples([9.0, 10.0, 11.0, 12.0, 13.0], places_m, scene=[3, *[scene] * 4])
 
     def frames(path: Path, _secret: bytes | None) -> Any:
-        if not made.has_frames:
+        if not session_files.has_frames:
             raise StoreError("frames.parquet is damaged")
         assert path.name == "frames of 2-2"
         return {"painted_ns": np.array([10.25e9, 10.5e9]), "sample_ns": np.array([10.125e9, 10.375e9])}
@@ -136,8 +136,8 @@ def session(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     fed: list[int] = []
     tracker = SimpleNamespace(feed=lambda samples: fed.extend(samples["time_ns"].tolist()), fed=fed)
     for name, function in {
-        "locate_session": lambda _folder: ("study", made),
-        "opened_key": lambda _study: made.key,
+        "locate_session": lambda _folder: ("study", session_files),
+        "opened_key": lambda _study: session_files.key,
         "open_events": lambda lines, _key: lines,
         "new_tracker": lambda _task: tracker,
         "_page": lambda *_arguments: page,
@@ -146,36 +146,36 @@ def session(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     monkeypatch.setattr(watch.journal, "read", lambda lines: lines)
     monkeypatch.setattr("study_app.store.recordings.read_samples", samples)
     monkeypatch.setattr("study_app.store.recordings.read_frames", frames)
-    return made
+    return session_files
 
 
 @pytest.mark.usefixtures("session")
 def test_an_interval_is_read_from_its_own_attempt_recording_and_lines() -> None:
-    read = watch.read_watched(Path("ses"), 4, attempt=2, interval=2)
-    assert (read.language, read.blinded, read.presented, read.intervals) == ("nl", False, "comparison", 2)
-    assert list(read.times_s) == [-1.0, 0.0, 1.0, 2.0, 3.0]
-    assert (read.samples["position_m"][:, 0] == 0.022).all()
-    assert read.tracker.fed == [10_000_000_000, 11_000_000_000, 12_000_000_000], "of the task alone: 2 s"  # type: ignore[attr-defined]
-    assert [(mark.at_s, mark.text) for mark in read.marks] == [
+    watched = watch.read_watched(Path("ses"), 4, attempt=2, interval=2)
+    assert (watched.language, watched.blinded, watched.presented, watched.intervals) == ("nl", False, "comparison", 2)
+    assert list(watched.times_s) == [-1.0, 0.0, 1.0, 2.0, 3.0]
+    assert (watched.samples["position_m"][:, 0] == 0.022).all()
+    assert watched.tracker.fed == [10_000_000_000, 11_000_000_000, 12_000_000_000], "of the task alone: 2 s"  # type: ignore[attr-defined]
+    assert [(mark.at_s, mark.text) for mark in watched.marks] == [
         (0.5, "note: in the second interval"), (3.0, "task ended: complete"),
     ]  # fmt: skip
-    assert read.painted_s == pytest.approx([0.25, 0.5])
-    assert read.shown_s == pytest.approx([0.125, 0.375])
+    assert watched.painted_s == pytest.approx([0.25, 0.5])
+    assert watched.shown_s == pytest.approx([0.125, 0.375])
 
 
 def test_a_sealed_interval_has_neither_contents_nor_frames_and_missing_frames_are_named(
     session: SimpleNamespace,
 ) -> None:
     session.has_frames = False
-    read = watch.read_watched(Path("ses"), 4, attempt=2, interval=2)
-    assert (read.lacking, len(read.painted_s)) == (
+    watched = watch.read_watched(Path("ses"), 4, attempt=2, interval=2)
+    assert (watched.lacking, len(watched.painted_s)) == (
         "The frames of the participant's screen are missing: frames.parquet is damaged.", 0,
     )  # fmt: skip
     session.key = None
-    read = watch.read_watched(Path("ses"), 4, attempt=2, interval=1)
-    assert (read.blinded, read.presented, read.lacking, len(read.painted_s)) == (True, "", "", 0)
-    assert (read.samples["position_m"][:, 0] == 0.021).all()
-    assert [mark.text for mark in read.marks] == ["note: in the first interval", "task ended: timeout"]
+    watched = watch.read_watched(Path("ses"), 4, attempt=2, interval=1)
+    assert (watched.blinded, watched.presented, watched.lacking, len(watched.painted_s)) == (True, "", "", 0)
+    assert (watched.samples["position_m"][:, 0] == 0.021).all()
+    assert [mark.text for mark in watched.marks] == ["note: in the first interval", "task ended: timeout"]
 
 
 def test_a_trial_without_a_recording_is_refused_with_the_reason(session: SimpleNamespace) -> None:
@@ -202,11 +202,11 @@ def test_the_tank_of_a_recorded_trial_is_that_of_its_block_with_the_ball_of_the_
     """The scene is of_scene times as large as the tank; its ball has a diameter of 68 mm."""
     protocol = load(study)
     with studies.begun(tmp_path / study, "P001", study) as store:
-        started: Any = event_of(
+        start_line: Any = event_of(
             "trial_started", trial=7, attempt=3, block=block, phase="main", part=1, index=2, of=5, code="V2"
         )
-        lines = [store.lines[0], event_of("language_chosen", language="nl"), started]
-        page = watch._page(store.place.study_folder, store.folder.receipt, lines, started, interval)
+        lines = [store.lines[0], event_of("language_chosen", language="nl"), start_line]
+        page = watch._page(store.place.study_folder, store.folder.receipt, lines, start_line, interval)
         assert page.task == protocol.tasks[protocol.blocks[block].task]
         assert (page.trial, page.workspace_m) == (7, (0.1, 0.06, 0.06))
         assert page.body_radius_m == pytest.approx(0.034 / of_scene)

@@ -42,7 +42,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(autouse=True)
 def _no_plug_is_pulled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Waiting for the disk has tests of its own; in all others the system's memory of a file will do."""
+    """Skip fsync in all tests but those of waiting for the disk."""
     monkeypatch.setattr("os.fsync", lambda _: None)
 
 
@@ -57,7 +57,7 @@ def protocol() -> Protocol:
 
 
 def ticking_clock() -> SessionClock:
-    """Return a clock that moves a millisecond with each look at it."""
+    """Return a clock that advances by a millisecond with each reading."""
     ticks = itertools.count(5_000_000_000, 1_000_000)
     origin = datetime(2026, 3, 1, 10, 0, tzinfo=timezone(timedelta(hours=1)))
     return SessionClock(lambda: next(ticks), origin)
@@ -101,11 +101,11 @@ def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Start:
 
 
 def choose(store: SessionStore, trial: int, items: list[dict[str, Any]]) -> None:
-    """Journal the choices that the answers ``items`` came from."""
+    """Journal the choices that lead to the answers ``items``."""
     for item in items:
-        told = {"trial": trial, "item": item["item"]}
-        store.append(journal_events.ItemShown(**told), t_s=item["onset_s"])
-        store.append(journal_events.Choice(value=item["value"], **told), t_s=item["first_s"])
+        which = {"trial": trial, "item": item["item"]}
+        store.append(journal_events.ItemShown(**which), t_s=item["onset_s"])
+        store.append(journal_events.Choice(value=item["value"], **which), t_s=item["first_s"])
 
 
 def summary_of_trial() -> dict[str, Any]:
@@ -138,17 +138,17 @@ def summary() -> dict[str, Any]:
 
 
 def attended(store: SessionStore, protocol: Protocol | None = None) -> None:
-    """Walk a session through its schedule as the session's machine journals it, up to the end."""
+    """Journal a whole session as the session's state machine does."""
     for trial in build_schedule(protocol or Protocol.model_validate(study_tables()), "P007", 11).trials:
         which = {"trial": trial.number, "attempt": 1}
-        told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
-        store.append(journal_events.TrialStarted(**which, **told))
+        fields = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        store.append(journal_events.TrialStarted(**which, **fields))
         store.append(event_of("trial_ended", **which, outcome="complete", **summary_of_trial()))
         store.write_tables()
         if trial.items:
-            told = {"onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
+            fields = {"onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
             items = [
-                {"item": item, "number": number, "value": 1 + (trial.number + number) % 7, **told}
+                {"item": item, "number": number, "value": 1 + (trial.number + number) % 7, **fields}
                 for number, item in enumerate(trial.items, start=1)
             ]
             choose(store, trial.number, items)

@@ -22,17 +22,17 @@ Lines = list[dict[str, Any]]
 
 
 def secret_of(recording: Path) -> bytes:
-    """Return what a recording is sealed with."""
+    """Return the secret that seals a recording."""
     return read_key(recording.parents[4]).nonce
 
 
 def parquet_of(recording: Path) -> io.BytesIO:
-    """Return a recording as the Parquet file that it is once it is opened."""
+    """Return the unsealed Parquet file of a recording."""
     return io.BytesIO(opened_content(recording, recording.read_bytes(), secret_of(recording)))
 
 
 def forge(journal: Path, change: Callable[[Lines], object], *, chained: bool = True) -> None:
-    """Change the lines of a journal, number them anew, and make every ``previous`` right or leave it out."""
+    """Change the lines of a journal, renumber them, and correct or omit every ``previous``."""
     lines = [json.loads(line) for line in journal.read_bytes().splitlines()]
     change(lines)
     content = b""
@@ -46,7 +46,7 @@ def forge(journal: Path, change: Callable[[Lines], object], *, chained: bool = T
 
 
 def cover_up(study: Path) -> None:
-    """Make tables, checksums and fingerprints of a study so that they fit the journals and receipts there are."""
+    """Rewrite tables, checksums and fingerprints of a study so that they match its journals and receipts."""
     folder = StudyFolder(study)
     folder.fingerprints.unlink(missing_ok=True)
     for session in folder.sessions():
@@ -65,7 +65,7 @@ def nothing(_lines: Lines) -> None:
 
 
 def change(session: Path, edit: Callable[[Lines], None], after: Callable[[Lines], None] = nothing) -> None:
-    """Change the journal as somebody would who has the key, before and after it is sealed."""
+    """Change the journal like a forger who has the key, before and after sealing."""
     path = session / "journal.jsonl"
     key = read_key(session.parents[2])
     lines: Lines = raw(open_events(read(path), key))
@@ -80,11 +80,11 @@ def change(session: Path, edit: Callable[[Lines], None], after: Callable[[Lines]
 
 
 def cut(session: Path, size: int) -> None:
-    """Leave so many bytes of the journal, and nothing that a session writes when it ends."""
+    """Cut the journal to its first bytes and remove the files that a session writes at its end."""
     path = session / "journal.jsonl"
     path.write_bytes(path.read_bytes()[:size])
-    for made in (*session.glob("*.csv"), session / "checksums.sha256"):
-        made.unlink()
+    for derived_file in (*session.glob("*.csv"), session / "checksums.sha256"):
+        derived_file.unlink()
     (session.parents[2] / "fingerprints.txt").unlink(missing_ok=True)
     shutil.rmtree(session / "recordings")
     receipt = session / "receipt.json"

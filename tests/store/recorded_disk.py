@@ -18,7 +18,7 @@ TAKES_ROOM = ("create", "write", "mkdir")
 
 
 class Call(NamedTuple):
-    """A call with the path that it changes or flushes; of a renaming that is the new name, and ``old`` the other."""
+    """A call with the path that it changes or flushes; for a renaming, the new path, and ``old`` the old one."""
 
     name: str
     path: Path
@@ -30,7 +30,7 @@ class KilledError(SystemExit):
 
 
 class Disk:
-    """The disk below ``root``: ``calls`` in order, and ``writers``, the functions of the store that made them.
+    """The calls on files below ``root`` in order, and ``writers``, the functions of the store that made them.
 
     The call with number ``at`` (from 0) has a fault: one error, a disk that stays full, or the program is killed.
     """
@@ -62,10 +62,10 @@ class Disk:
     def used(self) -> Iterator[None]:
         """Let the program use this disk."""
         with ExitStack() as patched:
-            opened = _opener(self, open)
+            opener = _opener(self, open)
             for module, name, replacement in (
-                (builtins, "open", opened),
-                (io, "open", opened),
+                (builtins, "open", opener),
+                (io, "open", opener),
                 (os, "fsync", lambda descriptor: self.call("fsync", _path_of(descriptor))),  # without waiting for it
                 *((os, name, self._renaming(getattr(os, name))) for name in ("rename", "replace")),
                 *((os, name, self._changing(name, getattr(os, name))) for name in ("unlink", "rmdir", "mkdir")),
@@ -91,7 +91,7 @@ class Disk:
 
 
 class _File(io.FileIO):
-    """A file whose writes are recorded; of a write on a full disk half gets there."""
+    """A file that records its writes; on a full disk, only half of a write succeeds."""
 
     disk: Disk
 

@@ -29,7 +29,7 @@ def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_what_does_not_fit_leaves_what_was_there_and_nothing_beside(tmp_path: Path) -> None:
+def test_a_failed_write_keeps_the_old_file_and_leaves_no_temporary_file(tmp_path: Path) -> None:
     table, lines = tmp_path / "table.csv", tmp_path / "reveals.jsonl"
     write_file(table, b"old\n")
     append_line(lines, b"1\n")
@@ -50,9 +50,7 @@ def test_what_does_not_fit_leaves_what_was_there_and_nothing_beside(tmp_path: Pa
     assert names_in(tmp_path) == ["reveals.jsonl", "table.csv"]
 
 
-def test_a_clock_that_is_ahead_removes_no_temporary_file_that_is_being_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_clock_ahead_does_not_remove_temporary_files_in_use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     new, old = temporary_path(tmp_path / "table"), temporary_path(tmp_path / "table")
     for path in (new, old):
         path.write_text("half", encoding="utf-8", newline="\n")
@@ -88,13 +86,13 @@ def test_lines_are_appended_after_a_torn_one_without_losing_either(tmp_path: Pat
 def test_a_file_is_on_the_disk_before_it_takes_its_place_and_its_place_after(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So that a power cut leaves the old file or the new one."""
+    """A power cut then leaves either the old file or the new one."""
     path = tmp_path / "table.csv"
     write_file(path, b"old\n")
-    seen: list[tuple[bytes, int]] = []
-    monkeypatch.setattr("os.fsync", lambda _: seen.append((path.read_bytes(), len(names_in(tmp_path)))))
+    writes: list[tuple[bytes, int]] = []
+    monkeypatch.setattr("os.fsync", lambda _: writes.append((path.read_bytes(), len(names_in(tmp_path)))))
     write_file(path, b"new\n")
-    assert seen == [(b"old\n", 2), (b"new\n", 1)]
+    assert writes == [(b"old\n", 2), (b"new\n", 1)]
 
 
 @pytest.mark.parametrize("offered", [True, False])

@@ -27,7 +27,7 @@ NOW = datetime(2026, 3, 2, 9, 30, tzinfo=timezone(timedelta(hours=1)))
 
 @pytest.fixture
 def folder(tmp_path: Path, start: Start, finished: Start) -> Path:
-    """P007 with five trials, P008 with none."""
+    """Return a study in which P007 has five trials and P008 has none."""
     finished()
     start("P008").finish("withdrawn")
     return tmp_path / "study"
@@ -56,10 +56,10 @@ def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> 
         key_open=False,
     )
     assert exclusions(folder) == (first, second)
-    for row, said in ((first, r"(withdrew)"), (second, "(=1+1, it rang)")):
-        with pytest.raises(StoreError) as refused:
+    for row, reason_text in ((first, r"(withdrew)"), (second, "(=1+1, it rang)")):
+        with pytest.raises(StoreError) as error:
             exclude(folder, row.participant, 1, trial=row.trial, by="CD", reason="slept")
-        assert str(refused.value).endswith(f" has been excluded since 2026-03-02T09:30:00.000+01:00 {said}")
+        assert str(error.value).endswith(f" has been excluded since 2026-03-02T09:30:00.000+01:00 {reason_text}")
     assert (folder / "exclusions.csv").read_text(encoding="utf-8") == (
         "participant,session,trial,rule_or_person,reason,excluded_at,key_open\n"
         "P008,1,n/a,rule 3,withdrew,2026-03-02T09:30:00.000+01:00,false\n"
@@ -79,7 +79,7 @@ def test_a_decision_after_unblinding_is_late_although_the_clock_was_set_back(fol
     assert verify_study(folder).is_sound
 
 
-def test_in_a_list_of_an_earlier_version_times_decide_what_is_late(folder: Path) -> None:
+def test_times_decide_which_exclusions_of_an_earlier_version_are_late(folder: Path) -> None:
     path = folder / "exclusions.csv"
     later = (datetime.now().astimezone() + timedelta(hours=1)).isoformat(timespec="milliseconds")
     path.write_text(
@@ -97,11 +97,13 @@ def test_in_a_list_of_an_earlier_version_times_decide_what_is_late(folder: Path)
     assert [row.key_open for row in exclusions(folder)] == [None, None, True]
 
 
-def test_the_first_reveal_in_whole_seconds_decides_what_is_late_in_an_earlier_list(tmp_path: Path) -> None:
+def test_the_first_reveal_in_whole_seconds_decides_which_earlier_exclusions_are_late(tmp_path: Path) -> None:
     (tmp_path / "blinding").mkdir()
     moments = "2026-03-02T09:30:05+01:00", "2026-03-02T09:30:01+01:00", "2026-03-02T09:30:09+01:00"
     records = [{"at": at, "by": "AB", "reason": "analysis", "key_hash": "a" * 64} for at in moments]
-    StudyFolder(tmp_path).reveals.write_text("".join(f"{json.dumps(it)}\n" for it in records), "utf-8", newline="\n")
+    StudyFolder(tmp_path).reveals.write_text(
+        "".join(f"{json.dumps(record)}\n" for record in records), "utf-8", newline="\n"
+    )
     times = ("09:30:01.999+01:00", "09:30:02.000+01:00", "08:30:01.500+00:00", "08:30:02.500+00:00", "noon")
     rows = [
         Exclusion(
@@ -110,15 +112,17 @@ def test_the_first_reveal_in_whole_seconds_decides_what_is_late_in_an_earlier_li
         for number, at in enumerate(times, start=1)
     ]
     assert [row.session for row in late_exclusions(tmp_path, rows)] == [2, 4]
-    judged = [replace(row, key_open=row.session > 3) for row in rows]
-    assert [row.session for row in late_exclusions(tmp_path, judged)] == [4, 5], "no times are compared"
+    exclusions_judged = [replace(row, key_open=row.session > 3) for row in rows]
+    assert [row.session for row in late_exclusions(tmp_path, exclusions_judged)] == [4, 5], "no times are compared"
 
 
-def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rule_does_not_exclude_a_session_that_a_person_included_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(unblinding, "_missed_catch_trials", lambda *_: ["3 of 4 catch trials", "2 of 2 catch trials"])
-    found = unblinding.exclude_inattentive(folder)
-    assert [(row.participant, row.rule_or_person) for row in found] == [("P007", "catch"), ("P008", "catch")]
-    assert {row.reason for row in found} == {"3 of 4 catch trials; 2 of 2 catch trials"}
+    rule_exclusions = unblinding.exclude_inattentive(folder)
+    assert [(row.participant, row.rule_or_person) for row in rule_exclusions] == [("P007", "catch"), ("P008", "catch")]
+    assert {row.reason for row in rule_exclusions} == {"3 of 4 catch trials; 2 of 2 catch trials"}
     include(folder, "P007", 1, by="AB", reason="the task was understood late")
     assert unblinding.exclude_inattentive(folder) == ()
     with pytest.raises(StoreError, match="is excluded: include it without --rule"):
@@ -149,34 +153,34 @@ def test_a_list_that_a_spreadsheet_saved_is_read(folder: Path) -> None:
     decided = exclusions(folder)
     path.write_bytes(codecs.BOM_UTF8 + path.read_bytes().replace(b"\n", b"\r\n"))
     assert exclusions(folder) == decided
-    assert [one for one in verify_study(folder).errors if one.place == "exclusions.csv"] == []
+    assert [error for error in verify_study(folder).errors if error.place == "exclusions.csv"] == []
     exclude(folder, "P007", 1, by="AB", reason="withdrew")
     assert exclusions(folder)[0] == decided[0]
     assert not path.read_bytes().startswith(codecs.BOM_UTF8)
 
 
-def test_an_exclusion_is_taken_back_and_stays_on_record(folder: Path) -> None:
-    kept = exclude(folder, "P008", 1, by="rule 3", reason="withdrew", now=NOW)
+def test_a_reversed_exclusion_stays_on_record(folder: Path) -> None:
+    kept_exclusion = exclude(folder, "P008", 1, by="rule 3", reason="withdrew", now=NOW)
     trial = exclude(folder, "P007", 1, trial=2, by="AB", reason="the phone rang", now=NOW)
     assert include(folder, "P007", 1, trial=2, by=" CD ", reason="it did not 🌊", now=NOW) == trial
-    assert exclusions(folder) == (kept,)
+    assert exclusions(folder) == (kept_exclusion,)
     (line,) = (folder / "exclusions_reversed.jsonl").read_text(encoding="utf-8").splitlines()
     record = json.loads(line)
     assert (record["by"], record["reason"], record["at"]) == ("CD", "it did not 🌊", exclusions(folder)[0].excluded_at)
     assert record["exclusion"]["reason"] == "the phone rang"
     again = exclude(folder, "P007", 1, trial=2, by="AB", reason="it did", now=NOW)
-    assert exclusions(folder) == (kept, again)
-    found = verify_study(folder)
-    assert found.is_sound
-    assert "exclusions_reversed" not in str(found)
+    assert exclusions(folder) == (kept_exclusion, again)
+    verification = verify_study(folder)
+    assert verification.is_sound
+    assert "exclusions_reversed" not in str(verification)
 
 
 def test_a_reason_is_kept_as_it_can_be_read(folder: Path) -> None:
     for letter in "\0\x1b\x85\u202e":
         with pytest.raises(StoreError, match=rf"--reason contains the character U\+{ord(letter):04X}, which cannot be"):
             exclude(folder, "P007", 1, by="catch", reason=f"missed {letter} many")
-    kept = exclude(folder, "P007", 1, by="catch", reason="missed \u2028 many\n trials ")
-    assert kept.reason == "missed many trials"
+    kept_exclusion = exclude(folder, "P007", 1, by="catch", reason="missed \u2028 many\n trials ")
+    assert kept_exclusion.reason == "missed many trials"
     include(folder, "P007", 1, by="CD", reason="understood late \u2029 and well")
     assert [(row.participant, row.rule_or_person) for row in reversals(folder)] == [("P007", "catch")]
     assert unblind(folder, "CD", "to analyse").left == ()
@@ -205,7 +209,7 @@ REASONS = st.text("""aé —,;'"=+-@n/\n\u2028""", min_size=1, max_size=12)
 
 
 def test_exclusions_are_a_set_that_decisions_change(folder: Path) -> None:
-    """Exclude and include in any order, with any reasons; a dict and a list say what must be recorded."""
+    """Exclude and include in any order with any reasons, and compare with a dict and a list."""
     count = iter(range(10**6))
 
     class Decisions(RuleBasedStateMachine):
@@ -222,10 +226,10 @@ def test_exclusions_are_a_set_that_decisions_change(folder: Path) -> None:
             recorded = trial is None or (person == "P007" and trial <= 5)
             if recorded and reason.strip() and not {decided, (person, None)} & self.excluded.keys():
                 now = NOW + timedelta(seconds=next(count))
-                made = exclude(self.place, person, 1, trial=trial, by="AB", reason=reason, now=now)
-                assert (made.what, made.reason) == ((person, 1, trial), " ".join(reason.split()))
-                assert made.excluded_at == now.isoformat(timespec="milliseconds")
-                self.excluded[decided] = made
+                exclusion = exclude(self.place, person, 1, trial=trial, by="AB", reason=reason, now=now)
+                assert (exclusion.what, exclusion.reason) == ((person, 1, trial), " ".join(reason.split()))
+                assert exclusion.excluded_at == now.isoformat(timespec="milliseconds")
+                self.excluded[decided] = exclusion
             else:
                 with pytest.raises(StoreError):
                     exclude(self.place, person, 1, trial=trial, by="AB", reason=reason)
@@ -252,21 +256,21 @@ def test_exclusions_are_a_set_that_decisions_change(folder: Path) -> None:
     run_state_machine_as_test(Decisions, settings=few)
 
 
-def test_what_is_not_there_is_told_with_what_is(folder: Path, tmp_path: Path) -> None:
+def test_a_missing_participant_session_or_trial_is_named_with_the_existing_ones(folder: Path, tmp_path: Path) -> None:
     for participant, session, trial, expected in (
         ("P007", 2, None, "does not contain session 2 of participant P007; sessions of that participant: 1"),
         ("P009", 1, None, "does not contain session 1 of participant P009; participants: P007, P008"),
         ("P007", 1, 6, "session 1 of participant P007 does not contain trial 6; its trials are 1, 2, 3, 4, 5"),
         ("P008", 1, 1, "session 1 of participant P008 does not contain trial 1; its trials are none"),
     ):
-        with pytest.raises(StoreError) as refused:
+        with pytest.raises(StoreError) as error:
             exclude(folder, participant, session, trial=trial, by="AB", reason="slept")
-        assert str(refused.value).removeprefix(f"{folder} ") == expected
+        assert str(error.value).removeprefix(f"{folder} ") == expected
     with pytest.raises(StoreError, match=r"of participant P001; participants: none$"):
         exclude(tmp_path / "empty", "P001", 1, by="AB", reason="slept")
     exclude(folder, "P007", 1, by="AB", reason="slept", now=NOW)
-    said = r"^participant P007, session 1, trial 2 has been excluded since .* \(slept\)$"
-    with pytest.raises(StoreError, match=said):
+    message = r"^participant P007, session 1, trial 2 has been excluded since .* \(slept\)$"
+    with pytest.raises(StoreError, match=message):
         exclude(folder, "P007", 1, trial=2, by="CD", reason="it rang")
 
 
@@ -277,7 +281,7 @@ def test_what_is_not_there_is_told_with_what_is(folder: Path, tmp_path: Path) ->
         {"key_open": "false"}, {"more": 1}, None,
     ],
 )  # fmt: skip
-def test_a_damaged_line_of_what_was_taken_back_is_named(folder: Path, changes: dict[str, object] | None) -> None:
+def test_a_damaged_line_of_the_reversed_exclusions_is_named(folder: Path, changes: dict[str, object] | None) -> None:
     for reason in ("slept", "it rang"):
         exclude(folder, "P007", 1, by="AB", reason=reason, now=NOW)
         include(folder, "P007", 1, by="CD", reason=f"é: {reason}", now=NOW)
@@ -291,6 +295,6 @@ def test_a_damaged_line_of_what_was_taken_back_is_named(folder: Path, changes: d
     else:
         record["exclusion"] |= changes
     path.write_bytes(first + b"\n\n" + json.dumps(record).encode() + b"\n")
-    with pytest.raises(StoreError) as refused:
+    with pytest.raises(StoreError) as error:
         reversals(folder)
-    assert str(refused.value) == (f"{path}, line 3 is not a reversed exclusion: remove it, or restore it from a backup")
+    assert str(error.value) == (f"{path}, line 3 is not a reversed exclusion: remove it, or restore it from a backup")

@@ -73,7 +73,7 @@ OF_P008 = ("--participant", "P008")
 
 @dataclass(frozen=True)
 class Writer:
-    """Something that writes below a folder: ``prepare`` is what was done before, ``act`` does it, also once more."""
+    """A function that writes below a folder: ``prepare`` runs before it, and ``act`` can be repeated."""
 
     act: Callable[[Path], object]
     prepare: Callable[[Path], object] = lambda _: None
@@ -87,10 +87,10 @@ def command(*words: str) -> Callable[[Path], object]:
     """Return a function that runs a command; FOLDER in ``words`` is the folder."""
 
     def run(folder: Path) -> int:
-        done = CliRunner().invoke(commands, [word.replace("FOLDER", str(folder)) for word in words])
-        if done.exception is not None and not isinstance(done.exception, SystemExit):
-            raise done.exception
-        return done.exit_code
+        result = CliRunner().invoke(commands, [word.replace("FOLDER", str(folder)) for word in words])
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return result.exit_code
 
     return run
 
@@ -125,15 +125,15 @@ def merge_one(folder: Path) -> None:
 
 
 def hold_session(folder: Path, results: str = "study", participant: str = "P009") -> None:
-    """Hold a session as a program does that is started again after each failure: begin, resume or rebuild it."""
+    """Run a session like a program that is restarted after each failure: begin, resume or rebuild it."""
     study = StudyFolder(folder / results)
     session = study.session(participant, 1)
     if session.journal.exists() and session.journal.read_bytes().count(b"session_ended"):
         rebuild_session(session.path)
         return
     if session.journal.exists() and b"\n" in session.journal.read_bytes():
-        given: dict[str, Any] = {"operator": "AB", "device": {}, "screens": {}}
-        store = reopen_store(session.path, study_protocol(), SOURCE, **given)
+        choices: dict[str, Any] = {"operator": "AB", "device": {}, "screens": {}}
+        store = reopen_store(session.path, study_protocol(), SOURCE, **choices)
     else:
         store = begun(study.path, participant, recordings=True, clock=ticking_clock(), simulated=True)
     with store:
@@ -162,11 +162,11 @@ def study_protocol() -> Any:
 def save_edits(folder: Path) -> None:
     """Keep a draft, then save the study."""
     file = folder / "edited.toml"
-    kept = drafts.Keeper(file, base=study_versions.content_hash(file.read_bytes()))
-    kept.note_edit("[study]\n", (), 0.0)
-    kept.write()
+    keeper = drafts.Keeper(file, base=study_versions.content_hash(file.read_bytes()))
+    keeper.note_edit("[study]\n", (), 0.0)
+    keeper.write()
     base = study_versions.content_hash(file.read_bytes())
-    kept.note_saved(study_versions.save_study(file, "[study]\n", base))
+    keeper.note_saved(study_versions.save_study(file, "[study]\n", base))
     study_settings.keep_original(file, "demo")
 
 
@@ -178,7 +178,7 @@ def write_small_files(folder: Path) -> None:
     with mock.patch.object(program_log.logging.getLogger("study_app"), "handlers", []):
         program_log.start_log()
     csv_files.write_columns(folder / "table.csv", made_table())
-    support.write_support(folder / "support.zip")
+    support.write_support_archive(folder / "support.zip")
     atomic.probe_free_bytes(folder)
     footage = output_files.FileCopy(folder / "waves.mp4", hashlib.sha256(b"waves").hexdigest())
     output_files.write_output(folder / "study", folder / "report", {"report.html": b"report", "waves.mp4": footage})
@@ -203,13 +203,13 @@ def leave_session(folder: Path) -> None:
     record_trial(store)
     store.close()
     lines = store.folder.journal.read_bytes().splitlines(keepends=True)
-    kept = [line for line in lines if b'"recorded"' not in line]
+    other_lines = [line for line in lines if b'"recorded"' not in line]
     (store.folder.recordings / "trial-001.parquet").unlink()
-    store.folder.journal.write_bytes(b"".join(kept) + b'{"n":')
+    store.folder.journal.write_bytes(b"".join(other_lines) + b'{"n":')
 
 
 def leave_claims(folder: Path) -> None:
-    """Leave a session that was claimed but not begun, a claim that was being made, and an old temporary file."""
+    """Leave a claimed but unstarted session, an unfinished claim, and an old temporary file."""
     for path in ("sub-P009/ses-01", f"sub-P009/{temporary_path(Path('ses-01')).name}"):
         (folder / "study/data" / path).mkdir(parents=True)
     for path in (folder / "study/data/sub-P009").iterdir():
@@ -239,9 +239,9 @@ def rehearse(folder: Path) -> None:
 def keep_proof(folder: Path) -> None:
     (folder / "proofs").mkdir(exist_ok=True)
     workstation.save_settings(workstation.MachineSettings(proofs=str(folder / "proofs")))
-    told = queue.Queue[str]()
-    write_proof(StudyFolder(folder / "study"), told.put)
-    assert told.get(timeout=20).startswith("the study's proof was written to")
+    proof_lines = queue.Queue[str]()
+    write_proof(StudyFolder(folder / "study"), proof_lines.put)
+    assert proof_lines.get(timeout=20).startswith("the study's proof was written to")
 
 
 PRIMITIVES: Final = {
@@ -351,7 +351,7 @@ def run(writer: Writer, folder: Path) -> tuple[int, str]:
     return (code if isinstance(code, int) else 0), ""
 
 
-def recorded(results: Path) -> dict[str, int]:
+def counts_of_records(results: Path) -> dict[str, int]:
     """Return how many lines each list of a results folder has, and how many times each journal has each event."""
     counts = {name: len((results / name).read_bytes().splitlines()) for name in LISTS if (results / name).exists()}
     for path in results.rglob("journal.jsonl"):
@@ -379,7 +379,7 @@ def program_of_its_own(fault: Fault) -> Iterator[None]:
 def problems_after(
     studied: Path, folder: Path, name: str, fault: Fault, at: int, whole: dict[str, int]
 ) -> Iterator[str]:
-    """Yield what is wrong after a writer met a fault at a call, and after it was run again; nothing if it met none."""
+    """Yield the problems after a writer met a fault at a call and after it was repeated."""
     writer, disk = WRITERS[name], Disk(folder, fault, at)
     shutil.copytree(studied, folder)
     writer.prepare(folder)
@@ -391,7 +391,7 @@ def problems_after(
     code = -9 if fault == "killed" else code
     results = folder / writer.results
     left = [str(error) for error in verify_study(results).errors] if results.exists() else []
-    if code == 0 and (left or recorded(results) != whole):
+    if code == 0 and (left or counts_of_records(results) != whole):
         yield f"exit code 0, though not everything is done: {left}"
     if code == 2 and not message:
         yield "exit code 2 without a message"
@@ -403,7 +403,7 @@ def problems_after(
         if code != 0 and not re.search("already|has been excluded since|is not excluded", message):
             yield f"the same command fails: {code} {message}"
         yield from (f"unsound: {error}" for error in verify_study(results).errors)
-        if (counts := recorded(results)) != whole:
+        if (counts := counts_of_records(results)) != whole:
             yield f"recorded {dict(counts.items() ^ whole.items())}"
 
 
@@ -422,7 +422,7 @@ def test_an_output_that_cannot_be_listed_is_mentioned(studied: Path, tmp_path: P
 
 @needs_posix
 @pytest.mark.usefixtures("user")
-def test_the_interface_names_what_unblinding_left(studied: Path, tmp_path: Path) -> None:
+def test_the_python_interface_reports_an_incomplete_unblinding(studied: Path, tmp_path: Path) -> None:
     shutil.copytree(studied, tmp_path / "copy")
     study = tmp_path / "copy/study"
     full = Disk(study, "full", 20)
@@ -443,17 +443,17 @@ FAULTS: Final = [fault for fault in get_args(Fault) if fault != "none"]
 
 
 def check_faults(studied: Path, folder: Path, name: str, fault: Fault, calls: Iterable[int]) -> None:
-    """Let a writer meet a fault at each of the ``calls``, up to its last one."""
+    """Run a writer with a fault at each of its calls."""
     shutil.copytree(studied, folder / "whole")
     WRITERS[name].prepare(folder / "whole")
     assert run(WRITERS[name], folder / "whole")[0] == 0
-    whole, problems = recorded(folder / "whole" / WRITERS[name].results), list[str]()
+    whole, problems = counts_of_records(folder / "whole" / WRITERS[name].results), list[str]()
     for at in calls:
         try:
-            found = list(problems_after(studied, folder / str(at), name, fault, at, whole))
+            faults = list(problems_after(studied, folder / str(at), name, fault, at, whole))
         except StopFaults:
             break
-        problems += [f"{fault} at call {at}: {problem}".replace(str(folder), "~") for problem in found]
+        problems += [f"{fault} at call {at}: {problem}".replace(str(folder), "~") for problem in faults]
         shutil.rmtree(folder / str(at))
     assert problems == []
 
@@ -477,7 +477,7 @@ def test_every_fault(studied: Path, tmp_path: Path, name: str, fault: Fault) -> 
 
 
 def early_changes(calls: list[Call]) -> Iterator[str]:
-    """Yield each change that follows from an earlier one that is not on the disk yet, and what never is.
+    """Yield each change that depends on an unflushed earlier one, and each change that is never flushed.
 
     A file's content is on the disk once the file is flushed; its name or removal, and a new folder, once the folder
     around is. Under a temporary name nothing counts until that is renamed.
@@ -488,10 +488,10 @@ def early_changes(calls: list[Call]) -> Iterator[str]:
             unflushed = {pair: name for pair, name in unflushed.items() if pair[1] != call.path}
             continue
         removes = call.name in ("unlink", "rmdir")
-        if (gone := call.path if removes else call.old) is not None:
-            if not removes and any(flushed.is_relative_to(gone) for _, flushed in unflushed):
+        if (removed_path := call.path if removes else call.old) is not None:
+            if not removes and any(flushed.is_relative_to(removed_path) for _, flushed in unflushed):
                 yield f"{call.path.name} takes its place before its content is flushed"
-            unflushed = {pair: name for pair, name in unflushed.items() if not pair[0].is_relative_to(gone)}
+            unflushed = {pair: name for pair, name in unflushed.items() if not pair[0].is_relative_to(removed_path)}
         if not (is_hidden(call.path) or call.name == "mkdir"):
             unordered = ("mkdir", "unlink", "rmdir") if removes else ("mkdir",)
             for (changed, _), name in unflushed.items():
@@ -519,7 +519,7 @@ def recorded_disk(studied: Path, folder: Path, writer: Writer) -> Disk:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("user")
-def test_what_is_written_is_on_the_disk_before_what_follows_from_it(studied: Path, tmp_path: Path) -> None:
+def test_files_are_flushed_before_files_that_depend_on_them(studied: Path, tmp_path: Path) -> None:
     """Except the tables of a session that runs, which follow from its journal."""
     for name, writer in WRITERS.items():
         calls = recorded_disk(studied, tmp_path / name, writer).calls

@@ -42,14 +42,14 @@ def test_lines_of_the_list_of_versions_that_are_not_versions_are_skipped(
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "data"))
     file = tmp_path / "honey.toml"
     keep_version(file, b"a = 1", "draft")
-    (listed,) = tmp_path.rglob("versions/*.jsonl")
+    (version_list,) = tmp_path.rglob("versions/*.jsonl")
     rows = [
         {"hash": "1f", "origin": "stolen", "at": "2026-03-01T10:00:00+01:00"},
         ["2e"],
         {"hash": "3d", "origin": "saved", "at": "2026-03-02T11:30:00+01:00", "by": "QX"},
         {"hash": "4c", "origin": "found"},
     ]
-    listed.write_bytes(b"\n".join([*(json.dumps(row).encode() for row in rows), b"{"]) + b"\n")
+    version_list.write_bytes(b"\n".join([*(json.dumps(row).encode() for row in rows), b"{"]) + b"\n")
     assert kept_versions(file) == (
         Kept(hash="3d", origin="saved", at="2026-03-02T11:30:00+01:00", by="QX"),
         Kept(hash="4c", origin="found", at="", by=""),

@@ -34,15 +34,15 @@ def lines_of(folder: Path) -> Iterator[str]:
         text = path.read_text(encoding="utf-8")
         if path.suffix == ".sealed":
             text = base64.b64decode(text).decode()
-        found = CHANGING.sub("*", text).splitlines()
-        yield f"== {path.relative_to(folder).as_posix()}: {len(found)} lines"
+        lines = CHANGING.sub("*", text).splitlines()
+        yield f"== {path.relative_to(folder).as_posix()}: {len(lines)} lines"
         if path.suffix in (".json", ".sealed"):
-            content = {key: one for key, one in json.loads(text).items() if key not in OF_THE_MACHINE}
+            content = {key: value for key, value in json.loads(text).items() if key not in OF_THE_MACHINE}
             yield from (CHANGING.sub("*", line) for line in value_lines(content))
         elif path.suffix == ".csv":
-            yield from (line.partition(":")[0] for line in table_lines("\n".join(found)))
+            yield from (line.partition(":")[0] for line in table_lines("\n".join(lines)))
         else:
-            yield from found[: MOST // 2] + found[MOST // 2 :: max(1, len(found) // MOST)]
+            yield from lines[: MOST // 2] + lines[MOST // 2 :: max(1, len(lines) // MOST)]
 
 
 @pytest.mark.parametrize("name", [*STUDIES[:2], *(pytest.param(name, marks=pytest.mark.slow) for name in STUDIES[2:])])

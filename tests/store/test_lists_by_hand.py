@@ -59,19 +59,19 @@ def sites(tmp_path: Path) -> Path:
         place = folder / "sites" / site
         (place / "data" / f"sub-{row[:4]}" / f"ses-0{row[5]}").mkdir(parents=True)
         (place / "exclusions.csv").write_text(COLUMNS + row, encoding="utf-8", newline="\n")
-    listed = [
+    site_entries = [
         {"name": name, "merged_at": AT, "key_hash": digit * 64, "sessions": sessions, "withdrawals": withdrawals}
         for name, digit, sessions, withdrawals in (("north", "a", 7, 1), ("south", "b", 9, None))
     ]
-    held = {"format": 2, "study": "stirring", "protocol_hash": "c" * 64, "sites": listed}
-    (folder / "sites.json").write_text(json.dumps(held), encoding="utf-8", newline="\n")
+    fields = {"format": 2, "study": "stirring", "protocol_hash": "c" * 64, "sites": site_entries}
+    (folder / "sites.json").write_text(json.dumps(fields), encoding="utf-8", newline="\n")
     return folder
 
 
 def test_a_merged_study_names_each_participant_and_exclusion_with_the_site(sites: Path) -> None:
     study = merged.read_merged(sites)
     assert study is not None
-    assert [(it.name, it.key_hash[0], it.sessions, it.withdrawals) for it in study.sites] == [
+    assert [(site.name, site.key_hash[0], site.sessions, site.withdrawals) for site in study.sites] == [
         ("north", "a", 7, 1), ("south", "b", 9, None),
     ]  # fmt: skip
     assert (study.path, study.study, study.protocol_hash) == (sites, "stirring", "c" * 64)
@@ -149,10 +149,10 @@ def test_a_site_that_is_a_link_is_named_with_its_place(sites: Path, tmp_path: Pa
         merged.read_merged(sites)
 
 
-def test_a_withdrawal_reaches_what_names_the_participant_and_nothing_of_others(
+def test_a_withdrawal_erases_every_file_that_names_the_participant_and_no_other(
     sites: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """P0071 stays; what was made from the merged study goes, too."""
+    """P0071 stays; outputs of the merged study are erased, too."""
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "user"))
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     north, results = sites / "sites" / "north", tmp_path / "results"
@@ -163,7 +163,9 @@ def test_a_withdrawal_reaches_what_names_the_participant_and_nothing_of_others(
         study.description: ['{"name": "stirring"}'],
         study.ignore: ["rebuilt.txt"],
         study.fingerprints: [f"k3vq-7m2p-xw4d  data/sub-{participant}/ses-01" for participant in participants],
-        study.reversed_exclusions: [json.dumps({"exclusion": {"participant": it}}) for it in participants],
+        study.reversed_exclusions: [
+            json.dumps({"exclusion": {"participant": participant}}) for participant in participants
+        ],
         study.participants("stirring"): ["study,participant", "stirring,P0071"],
         north / "notes.txt": ["(P007) was late"],
         north / "other.txt": ["P0071 and XP007 were early"],
@@ -180,10 +182,10 @@ def test_a_withdrawal_reaches_what_names_the_participant_and_nothing_of_others(
     assert list(withdrawals.unerased_files(study, "P007")) == [
         north / "data" / "sub-P007", study.exclusions, study.fingerprints, study.reversed_exclusions,
     ]  # fmt: skip
-    done = withdrawals.withdraw(north, "P007", by="AB", reason="asked")
-    assert (done.folders, done.outputs) == ((north,), (tmp_path / "report" / "report.html",))
-    assert done.left[0] == f"{north / 'notes.txt'} still names P007"
-    assert set(done.left[1:]) == {
+    withdrawal = withdrawals.withdraw(north, "P007", by="AB", reason="asked")
+    assert (withdrawal.folders, withdrawal.outputs) == ((north,), (tmp_path / "report" / "report.html",))
+    assert withdrawal.left[0] == f"{north / 'notes.txt'} still names P007"
+    assert set(withdrawal.left[1:]) == {
         f"{results / 'old.ZIP'} is an archive, which is not searched: delete it if it contains data from P007",
         f"{results / 'mail.txt'} still names P007",
     }
@@ -193,7 +195,8 @@ def test_a_withdrawal_reaches_what_names_the_participant_and_nothing_of_others(
         assert path.read_text("utf-8") == f"{lists[path][1]}\n"
     assert withdrawals.withdraw(north, "P007", by="CD", reason="again").folders == ()
     assert study.ignore.read_text("utf-8").splitlines() == ["rebuilt.txt", "withdrawals.jsonl"]
-    assert [(it.participant, it.by, it.reason) for it in withdrawals.tombstones(study).values()] == [
+    tombstones = withdrawals.tombstones(study).values()
+    assert [(tombstone.participant, tombstone.by, tombstone.reason) for tombstone in tombstones] == [
         ("P007", "AB", "asked"),
     ]  # fmt: skip
 
@@ -212,7 +215,7 @@ TOMBSTONE = {"participant": "P007", "at": AT, "by": "AB", "reason": "asked", "se
         )),
     ],
 )  # fmt: skip
-def test_a_line_that_is_no_withdrawal_is_refused_with_its_number(tmp_path: Path, change: dict[str, Any]) -> None:
+def test_an_invalid_withdrawal_line_is_refused_with_its_number(tmp_path: Path, change: dict[str, Any]) -> None:
     study = StudyFolder(tmp_path)
     lines = [TOMBSTONE, TOMBSTONE | {"participant": "P011", "by": "CD"}]
     text = "\n".join(json.dumps(line) for line in lines)
@@ -250,22 +253,22 @@ def test_a_copy_has_a_key_or_sessions_and_an_export_the_name_of_the_study(tmp_pa
 
 
 def test_a_decision_of_a_person_or_a_rule_is_reversed_with_its_own_words(tmp_path: Path) -> None:
-    """Missing trials exclude no session that a person included again; what was kept despite another rule they do."""
+    """The rule on missing trials excludes sessions kept despite another rule, but none that a person included."""
     for participant in ("P007", "P008", "P009", "P011"):
         (tmp_path / "data" / f"sub-{participant}" / "ses-02").mkdir(parents=True)
     for participant in ("P007", "P008"):
         exclusions.exclude_incomplete(tmp_path, participant, 2, f"{participant} lacks trials")
-    taken = exclusions.include(tmp_path, "P007", 2, by="AB", reason="enough trials")
+    inclusion = exclusions.include(tmp_path, "P007", 2, by="AB", reason="enough trials")
     exclusions.exclude_incomplete(tmp_path, "P007", 2, "again")
-    assert (taken.participant, taken.rule_or_person, taken.reason) == (
+    assert (inclusion.participant, inclusion.rule_or_person, inclusion.reason) == (
         "P007", exclusions.MISSING_RULE, "P007 lacks trials",
     )  # fmt: skip
     assert [row.participant for row in exclusions.exclusions(tmp_path)] == ["P008"]
-    assert exclusions.reversals(tmp_path) == (taken,)
+    assert exclusions.reversals(tmp_path) == (inclusion,)
     (reversal,) = exclusions.dated_reversals(tmp_path)
     assert (reversal.by, reversal.reason, reversal.key_open) == ("AB", "enough trials", False)
-    kept = exclusions.keep(tmp_path, "P009", 2, rule="fast_answers", by="CD", reason="read aloud")
-    assert (kept.rule_or_person, kept.reason) == ("fast_answers", "read aloud (decided by CD)")
+    kept_decision = exclusions.keep(tmp_path, "P009", 2, rule="fast_answers", by="CD", reason="read aloud")
+    assert (kept_decision.rule_or_person, kept_decision.reason) == ("fast_answers", "read aloud (decided by CD)")
     exclusions.exclude_incomplete(tmp_path, "P009", 2, "P009 lacks trials")
     assert [row.what for row in exclusions.exclusions(tmp_path)] == [("P008", 2, None), ("P009", 2, None)]
     ruled = exclusions.exclude(tmp_path, "P007", 2, by="EF", reason="too fast", rule="fast_answers")
@@ -285,11 +288,12 @@ def test_a_decision_of_a_person_or_a_rule_is_reversed_with_its_own_words(tmp_pat
     with pytest.raises(StoreError, match="does not contain session 3 of participant P009"):
         exclusions.keep(tmp_path, "P009", 3, rule="fast_answers", by="CD", reason="no")
     (tmp_path / "blinding").mkdir()
-    opened = {"at": AT, "by": "GH", "reason": "analysis", "key_hash": "a" * 64}
-    (tmp_path / "blinding" / "reveals.jsonl").write_text(f"{json.dumps(opened)}\n", encoding="utf-8", newline="\n")
+    reveal = {"at": AT, "by": "GH", "reason": "analysis", "key_hash": "a" * 64}
+    (tmp_path / "blinding" / "reveals.jsonl").write_text(f"{json.dumps(reveal)}\n", encoding="utf-8", newline="\n")
     exclusions.keep(tmp_path, "P011", 2, rule="fast_answers", by="IJ", reason="read twice")
     decisions = exclusions.dated_reversals(tmp_path)
-    assert [(it.exclusion.participant, it.by, it.reason, it.key_open) for it in decisions] == [
+    rows = [(decision.exclusion.participant, decision.by, decision.reason, decision.key_open) for decision in decisions]
+    assert rows == [
         ("P007", "AB", "enough trials", False), ("P009", "CD", "read aloud", False), ("P011", "IJ", "read twice", True),
     ]  # fmt: skip
 
@@ -324,11 +328,13 @@ def test_files_are_written_into_folders_that_a_failure_removes_again(
         ):
             output_files.write_files(tmp_path, files)
     assert [path.name for path in tmp_path.rglob("*")] == ["there"]
-    said: list[str] = []
-    written = output_files.write_output(study, tmp_path, files, said.append)
-    assert [(path, path.read_bytes()) for path in written] == [(tmp_path / name, held) for name, held in files.items()]
+    warnings: list[str] = []
+    outputs = output_files.write_output(study, tmp_path, files, warnings.append)
+    assert [(path, path.read_bytes()) for path in outputs] == [
+        (tmp_path / name, file_content) for name, file_content in files.items()
+    ]
     for of, to, names in ((tmp_path / "other", tmp_path, ["c.csv"]), (study, tmp_path / "away", ["d.csv"])):
-        output_files.write_output(of, to, dict.fromkeys(names, b"4"), said.append)
+        output_files.write_output(of, to, dict.fromkeys(names, b"4"), warnings.append)
     assert [(output.to, output.files) for output in output_files.outputs(study)] == [
         (tmp_path, tuple(files)), (tmp_path / "away", ("d.csv",)),
     ]  # fmt: skip
@@ -336,8 +342,8 @@ def test_files_are_written_into_folders_that_a_failure_removes_again(
     assert (erased, [output.to for output in elsewhere]) == ((tmp_path / "away" / "d.csv",), [tmp_path])
     with monkeypatch.context() as failing:
         failing.setattr(output_files, "append_line", lambda path, *_, **__: atomic.append_line(path / "x", b""))
-        output_files.write_output(study, tmp_path / "third", {"e.csv": b"5"}, said.append)
-    assert [line.partition(" could")[0] for line in said] == [f"the output in {tmp_path / 'third'}"]
+        output_files.write_output(study, tmp_path / "third", {"e.csv": b"5"}, warnings.append)
+    assert [line.partition(" could")[0] for line in warnings] == [f"the output in {tmp_path / 'third'}"]
 
 
 def test_a_rebuilt_list_of_checksums_names_the_files_that_changed(tmp_path: Path) -> None:
@@ -382,8 +388,8 @@ def test_a_draft_that_another_program_wrote_is_kept_as_a_version(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "data"))
-    file, kept = tmp_path / "study.toml", list[tuple[Path, bytes]]()
-    monkeypatch.setattr(drafts, "keep_version", lambda file, text, _why: kept.append((file, text)))
+    file, kept_files = tmp_path / "study.toml", list[tuple[Path, bytes]]()
+    monkeypatch.setattr(drafts, "keep_version", lambda file, text, _why: kept_files.append((file, text)))
     keeper = drafts.Keeper(file, "base")
     keeper.note_edit("mine", ("blocks", 2), 10.0)
     assert not keeper.write_if_due(10.0 + drafts.REST_S - 0.01)
@@ -396,7 +402,7 @@ def test_a_draft_that_another_program_wrote_is_kept_as_a_version(
     drafts.write_draft(file, drafts.Draft(text="theirs", base="other", selected=()))
     keeper.note_edit("mine again", (), 20.0)
     assert keeper.write()
-    assert (kept, keeper.others) == ([(file, b"theirs")], 1)
+    assert (kept_files, keeper.others) == ([(file, b"theirs")], 1)
     drafts.write_draft(file, drafts.Draft(text="theirs again", base="other", selected=()))
     keeper.note_saved("saved")
     assert drafts.draft_of(file) is not None, "the draft of another program stays"
@@ -410,7 +416,7 @@ def test_a_draft_that_another_program_wrote_is_kept_as_a_version(
         drafts.delete_draft(file)
 
 
-def test_claims_are_removed_once_no_program_can_be_making_them(tmp_path: Path) -> None:
+def test_abandoned_claims_are_removed(tmp_path: Path) -> None:
     now = time.time()
     ages_s = {"new": 0.0, "old": 3600.0 * 48, "later": -3600.0 * 48}
     folders = {name: atomic.temporary_path(tmp_path / name) for name in ages_s}
@@ -446,7 +452,7 @@ def test_a_claim_that_cannot_be_removed_is_left_and_the_others_are_removed(tmp_p
 
 
 def test_plug_ins_are_named_by_package_and_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    held = {
+    fields = {
         "a": [{"package": "oils", "version": "1.2", "kind": "task", "name": "swirl"}],
         "b": [
             {"package": "oils", "version": "1.2", "kind": "method", "name": "ladder"},
@@ -454,8 +460,8 @@ def test_plug_ins_are_named_by_package_and_version(tmp_path: Path, monkeypatch: 
         ],
         "c": None,
     }
-    monkeypatch.setattr(receipt, "read", lambda path: {"plug_ins": held[path.name]} if path.name in held else {})
-    assert receipt.recorded_plug_ins(tmp_path / name for name in ("none", *held)) == {
+    monkeypatch.setattr(receipt, "read", lambda path: {"plug_ins": fields[path.name]} if path.name in fields else {})
+    assert receipt.recorded_plug_ins(tmp_path / name for name in ("none", *fields)) == {
         "oils 1.2": ["method ladder", "task swirl"],
         "oils 1.3": ["task tilt"],
     }
@@ -479,23 +485,23 @@ def test_plug_ins_are_named_by_package_and_version(tmp_path: Path, monkeypatch: 
         ),
     ],
 )  # fmt: skip
-def test_a_receipt_publishes_codes_and_what_is_compared_but_no_condition(
+def test_a_receipt_publishes_codes_and_comparisons_but_not_the_conditions(
     name: str, edit: tuple[str, str], codes: dict[str, Any], compares: list[Any], orders: list[Any]
 ) -> None:
     protocol = parse(source_bytes(name).decode().replace(*edit).encode(), name)
-    shown = receipt.without_conditions(protocol)
-    assert {"liquids", "conditions", "stimuli", "methods"}.isdisjoint(shown)
-    blocks = shown["blocks"].values()
+    published = receipt.without_conditions(protocol)
+    assert {"liquids", "conditions", "stimuli", "methods"}.isdisjoint(published)
+    blocks = published["blocks"].values()
     assert {"conditions", "standard", "stimulus", "standards", "method"}.isdisjoint(
         key for table in blocks for key in table
     )
-    assert {block: table["codes"] for block, table in shown["blocks"].items()} == codes
+    assert {block: table["codes"] for block, table in published["blocks"].items()} == codes
     assert [table["compares"] for table in blocks] == compares
     assert [(table["order"], table.get("slots"), table["questionnaire"]) for table in blocks] == orders
     for table in blocks:
-        assert shown["questionnaires"][table["questionnaire"]]["items"]
-    assert "0.321" not in json.dumps(shown)
-    assert not any("modulus" in design for design in shown.get("designs", {}).values())
+        assert published["questionnaires"][table["questionnaire"]]["items"]
+    assert "0.321" not in json.dumps(published)
+    assert not any("modulus" in design for design in published.get("designs", {}).values())
 
 
 @pytest.mark.parametrize(
@@ -598,11 +604,11 @@ def test_a_message_names_the_file_and_then_the_reason(
         monkeypatch.setattr(Path, "unlink", refuse)
         if "read" in sentence:
             monkeypatch.setattr(Path, "stat", refuse)
-    with pytest.raises(StoreError) as raised:
+    with pytest.raises(StoreError) as error:
         act(tmp_path)
     monkeypatch.undo()
-    said = str(raised.value).replace(os.sep, "/")
-    assert said.startswith(sentence.format(at=tmp_path.as_posix(), half=half.name))
+    message = str(error.value).replace(os.sep, "/")
+    assert message.startswith(sentence.format(at=tmp_path.as_posix(), half=half.name))
 
 
 def _raise(error: Exception) -> None:
@@ -640,7 +646,7 @@ def runs(tmp_path: Path) -> Path:
     for folder, participant, content, day, fields in sessions:
         items = [{"id": "thick"}, {"id": "warm"}] if content == "a" else [{"id": "thick"}]
         protocol = {"study": {"version": f"0.{content}"}, "questionnaires": {"feel": {"items": items}}}
-        held = {
+        field_values = {
             "key_hash": "c" * 64,
             "protocol_hash": content * 64,
             "protocol": protocol,
@@ -649,16 +655,17 @@ def runs(tmp_path: Path) -> Path:
         }
         path = tmp_path / folder / "data" / f"sub-{participant}" / "ses-01" / "receipt.json"
         path.parent.mkdir(parents=True)
-        path.write_text(json.dumps(held), encoding="utf-8", newline="\n")
+        path.write_text(json.dumps(field_values), encoding="utf-8", newline="\n")
     return tmp_path
 
 
 def test_runs_of_a_study_are_counted_by_kind_and_content(runs: Path) -> None:
-    found = study_runs.runs_of_study(runs, "demo")
-    assert [(run.hash[0], run.version, run.sessions, run.pilots, run.rehearsals, run.last[:10]) for run in found] == [
+    listed_runs = study_runs.runs_of_study(runs, "demo")
+    facts = [(run.hash[0], run.version, run.sessions, run.pilots, run.rehearsals, run.last[:10]) for run in listed_runs]
+    assert facts == [
         ("a", "0.a", 1, 2, 0, "2026-03-05"), ("b", "0.b", 2, 0, 1, "2026-03-09"),
     ]  # fmt: skip
-    assert study_runs.recorded_items(found) == {("feel", "thick"): 3, ("feel", "warm"): 1}
+    assert study_runs.recorded_items(listed_runs) == {("feel", "thick"): 3, ("feel", "warm"): 1}
     assert study_runs.runs_of_study(runs, "../demo") == ()
     contents = study_runs.recorded_contents(runs / "demo")
     assert [content.name for content in contents] == [
@@ -680,8 +687,8 @@ def test_the_original_and_the_versions_of_a_study_are_kept_by_its_file(
     monkeypatch.setattr(study_versions, "load_or_default", lambda: (SimpleNamespace(operator="AK"), None))
     for origin, text in (("saved", b"one"), ("draft", b"two"), ("found", b"one")):
         study_versions.keep_version(file, text, origin)
-    kept = study_versions.kept_versions(file)
-    assert [(it.origin, it.by, it.hash) for it in kept] == [
+    kept_files = study_versions.kept_versions(file)
+    assert [(kept_file.origin, kept_file.by, kept_file.hash) for kept_file in kept_files] == [
         ("saved", "AK", study_versions.content_hash(b"one")), ("draft", "", study_versions.content_hash(b"two")),
     ]  # fmt: skip
     assert [study_versions.saver_of(study_versions.content_hash(text)) for text in (b"two", b"one", b"3")] == [
@@ -697,7 +704,7 @@ def test_the_original_and_the_versions_of_a_study_are_kept_by_its_file(
         ("pilot", "participant ID 'pilot' is reserved for pilot sessions"),
     ],
 )
-def test_an_id_that_cannot_be_used_is_named_with_what_is_permitted(participant: str, sentence: str) -> None:
+def test_an_invalid_participant_id_is_refused_with_the_permitted_form(participant: str, sentence: str) -> None:
     with pytest.raises(StoreError, match=f"^{sentence}"):
         begin.check_participant(participant)
     begin.check_participant("p" * 32)
@@ -748,8 +755,8 @@ def test_sites_of_another_kind_and_sessions_of_two_sites_are_not_merged(changed:
         merge._check_sessions(sources)
 
 
-def test_a_receipts_hash_is_that_of_what_does_not_change_later() -> None:
-    held = {"participant": "P7", "status": "unfinished", "resumed": [], "device": {"name": "falcon", "serial": "7"}}
+def test_the_hash_of_a_receipt_covers_the_fields_that_never_change() -> None:
+    fields = {"participant": "P7", "status": "unfinished", "resumed": [], "device": {"name": "falcon", "serial": "7"}}
     later = {
         "status": "completed",
         "reason": "r",
@@ -757,9 +764,9 @@ def test_a_receipts_hash_is_that_of_what_does_not_change_later() -> None:
         "resumed": [{"at": AT}],
         "outlets_lost": {"LSL": "1"},
     }
-    assert receipt.digest(held | later) == receipt.digest(dict(reversed(held.items())))
+    assert receipt.digest(fields | later) == receipt.digest(dict(reversed(fields.items())))
     for changed in ({"participant": "P8"}, {"device": {"name": "falcon", "serial": "8"}}):
-        assert receipt.digest(held | changed) != receipt.digest(held)
+        assert receipt.digest(fields | changed) != receipt.digest(fields)
 
 
 def test_temporary_files_of_a_name_are_not_those_of_a_longer_one(tmp_path: Path) -> None:
@@ -778,12 +785,12 @@ def test_temporary_files_of_a_name_are_not_those_of_a_longer_one(tmp_path: Path)
         (f"P1,1,AB,rang,{AT},true", "line 3: has 6 fields"),
     ],
 )
-def test_a_row_that_is_no_exclusion_is_quoted_with_its_line(tmp_path: Path, row: str, sentence: str) -> None:
+def test_an_invalid_exclusion_is_quoted_with_its_line(tmp_path: Path, row: str, sentence: str) -> None:
     path = tmp_path / "exclusions.csv"
     path.write_text(f"{COLUMNS}P2,1,n/a,AB,rang,{AT},TRUE\n{row}\n", encoding="utf-8", newline="\n")
-    with pytest.raises(StoreError) as raised:
+    with pytest.raises(StoreError) as error:
         exclusions.exclusions(tmp_path)
-    assert str(raised.value).startswith(f"{path}, {sentence}")
+    assert str(error.value).startswith(f"{path}, {sentence}")
     path.write_bytes(b"\xff")
     with pytest.raises(StoreError, match=f"^{escape(str(path))}: "):
         exclusions.exclusions(tmp_path)
@@ -814,7 +821,7 @@ def test_a_key_of_another_session_is_named_with_that_session(tmp_path: Path, mon
     assert blinding.sealed_hash(tmp_path) is None
 
 
-def test_measured_values_within_the_limits_are_valid_and_none_is_unknown() -> None:
+def test_values_within_the_limits_are_valid_and_missing_values_unknown() -> None:
     limits = {"lateness_ms": 2.0, "withheld_percent": 5.0}
     measured = ({"lateness_p99_ms": 1.9}, {"lateness_p99_ms": 2.1}, {"worst_gap_ms": 99.0}, {})
     assert [is_within_limits(row, limits) for row in measured] == [True, False, None, None]

@@ -18,13 +18,13 @@ from tests.windows_rules import LONGEST_PATH, Windows, windows
 __all__ = ["windows"]
 
 
-def test_an_output_over_a_file_that_is_open_elsewhere_replaces_no_file(tmp_path: Path, windows: Windows) -> None:
+def test_an_output_does_not_replace_files_if_one_is_open_elsewhere(tmp_path: Path, windows: Windows) -> None:
     old = {"responses.csv": b"old\n", "trials.csv": b"old\n", "tables/mean.csv": b"old\n"}
     write_files(tmp_path, old)
     new = dict.fromkeys(old, b"new\n")
-    with windows.hold(tmp_path / "trials.csv"), pytest.raises(AnalysisError) as refused:
+    with windows.hold(tmp_path / "trials.csv"), pytest.raises(AnalysisError) as error:
         write_files(tmp_path, new)
-    assert f"{tmp_path / 'trials.csv'} cannot be replaced (Permission denied): close the program" in str(refused.value)
+    assert f"{tmp_path / 'trials.csv'} cannot be replaced (Permission denied): close the program" in str(error.value)
     assert contents(tmp_path) == old
     write_files(tmp_path, new)
     assert contents(tmp_path) == new
@@ -72,7 +72,7 @@ def test_sessions_begin_and_end_while_the_participants_table_is_open_elsewhere(
 
 
 def test_a_session_whose_paths_would_be_too_long_does_not_begin(start: Start, tmp_path: Path, windows: Windows) -> None:
-    """The longest path is that of the table of responses while it is written, of 104 characters below the results."""
+    """The longest path, the temporary file of the responses table, has 104 characters below the results folder."""
     for room, begins in ((103, False), (104, True)):
         results = tmp_path / ("r" * (LONGEST_PATH - room - len(str(tmp_path)) - 1))
         if begins:
@@ -85,7 +85,7 @@ def test_a_session_whose_paths_would_be_too_long_does_not_begin(start: Start, tm
 
 
 def test_two_programs_write_one_log(tmp_path: Path, windows: Windows, monkeypatch: pytest.MonkeyPatch) -> None:
-    """While another program has it open, it cannot be renamed: it grows, and no record is lost."""
+    """A log that another program has open cannot be renamed: it grows, and every record is kept."""
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path))
     logger = logging.getLogger("study_app")
     monkeypatch.setattr(logger, "handlers", [])

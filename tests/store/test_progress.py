@@ -24,8 +24,8 @@ ORACLE = Path(__file__).parents[1] / "analysis" / "oracle"
 def assert_whole_with_key(folder: Path, text: bytes) -> None:
     protocol = parse(text, "study")
     open_or_draw_key(folder, protocol, random=stream(1, "key").random)
-    shown = json.loads(json.dumps(without_conditions(protocol)))
-    completed, expected = complete_protocol(shown, read_key(folder)).model_dump(), protocol.model_dump()
+    published = json.loads(json.dumps(without_conditions(protocol)))
+    completed, expected = complete_protocol(published, read_key(folder)).model_dump(), protocol.model_dump()
     for block in (*completed["blocks"].values(), *expected["blocks"].values()):
         block["conditions"], block["compares"] = sorted(block["conditions"]), None  # in the order of the codes
     assert completed == expected
@@ -52,14 +52,14 @@ def test_the_protocol_of_every_study_is_whole_again_with_its_key(tmp_path: Path,
 
 
 def test_sessions_are_listed_while_a_participant_is_withdrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    study, listed = StudyFolder(tmp_path), Path.glob
+    study, list_folder = StudyFolder(tmp_path), Path.glob
     study.session("P002", 1).path.mkdir(parents=True)
-    gone = iter([True, False])
+    vanishes = iter([True, False])
 
     def folder_that_goes(self: Path, pattern: str) -> Iterator[Path]:
-        if next(gone):
+        if next(vanishes):
             raise FileNotFoundError(self / "sub-P001")
-        return listed(self, pattern)
+        return list_folder(self, pattern)
 
     monkeypatch.setattr(Path, "glob", folder_that_goes)
     assert study.ids() == ("P002",)
@@ -102,7 +102,7 @@ def test_each_further_attempt_at_a_trial_of_intervals_has_its_reason() -> None:
     assert progress.invalid == 1
 
 
-def test_what_the_operator_is_told_of_a_trial_is_forgotten_when_it_is_repeated() -> None:
+def test_the_operators_facts_about_a_trial_are_reset_when_it_is_repeated() -> None:
     progress, which = Progress(), {"trial": 4, "attempt": 2}
     answer = {"item": "which", "value": "second", "onset_s": 20.0, "first_s": 21.5, "last_s": 22.75}
     measured = {"device_delay_ticks": 4, "loop_delay_ticks": 1}
@@ -118,8 +118,8 @@ def test_what_the_operator_is_told_of_a_trial_is_forgotten_when_it_is_repeated()
         event_of("note", t_s=130.0, kind="note", text="coughed"),
     ):
         progress.process_line(line)
-    told = progress.trial_answers[4]
-    assert (told.value, told.seconds, progress.answered) == ("second", 1.5, {4: 1})
+    trial_answers = progress.trial_answers[4]
+    assert (trial_answers.value, trial_answers.seconds, progress.answered) == ("second", 1.5, {4: 1})
     assert (progress.broken[4], progress.undelivered) == (
         (("lateness_p99_ms", 2.5, 2.0),), {4: ("level_error_percent",)},
     )  # fmt: skip
@@ -133,7 +133,7 @@ def test_what_the_operator_is_told_of_a_trial_is_forgotten_when_it_is_repeated()
 @pytest.mark.parametrize(
     ("limits", "invalid", "missing"), [({"attempts": 3.0}, 2, 0), ({"attempts": 3.0}, 3, 1), ({}, 1, 1)]
 )
-def test_a_trial_is_missing_once_it_is_not_presented_again(
+def test_a_trial_counts_as_missing_only_if_it_is_not_repeated(
     limits: dict[str, float], invalid: int, missing: int
 ) -> None:
     progress = Progress()
@@ -204,8 +204,8 @@ def test_each_line_leaves_the_session_at_its_step_page_and_trial() -> None:
     assert (progress.presented, progress.steps) == ({1: 4, 3: 1, 4: 1}, {1: 2, 3: 5, 4: 6})
 
 
-def test_a_form_is_counted_by_the_block_before_it_and_forgets_what_was_chosen_before() -> None:
-    progress, chosen = Progress(), {"item": "calm", "value": 3, "first_s": 2.0}
+def test_a_repeated_form_is_counted_by_its_block_and_starts_without_choices() -> None:
+    progress, choice = Progress(), {"item": "calm", "value": 3, "first_s": 2.0}
     for line in (
         event_of("form_shown", form="load"),
         event_of("choice", t_s=2.0, form="load", item="calm", value=3),
@@ -219,16 +219,16 @@ def test_a_form_is_counted_by_the_block_before_it_and_forgets_what_was_chosen_be
     ):
         progress.process_line(line)
     assert (progress.answers["calm"].given, progress.unconfirmed) == (False, {})
-    progress.process_line(event_of("form_answered", form="load", items=[chosen]))
+    progress.process_line(event_of("form_answered", form="load", items=[choice]))
     assert progress.answers == {}
     progress.process_line(event_of("form_shown", form="load", after="delays"))
-    items = [chosen, {"item": "wet"}, chosen]
+    items = [choice, {"item": "wet"}, choice]
     progress.process_line(event_of("form_answered", form="load", after="delays", items=items))
     assert progress.answered == {("load", None): 1, ("load", "delays"): 2}
     for phase, expected in (("practice", {}), ("main", {5: 1})):
         other = Progress()
         other.process_line(event_of("trial_started", trial=5, attempt=1, phase=phase))
-        other.process_line(event_of("responses", trial=5, attempt=1, items=[chosen]))
+        other.process_line(event_of("responses", trial=5, attempt=1, items=[choice]))
         assert (other.answered, other.trial_answers) == (expected, {}), "a trial without intervals"
 
 
@@ -241,8 +241,8 @@ def test_choices_of_a_trial_that_begins_again_are_kept_by_attempt_and_given_up_i
         event_of("choice", t_s=9.0, trial=4, item="thick", value=2),
     ):
         progress.process_line(line)
-    told = {which: answers["thick"].value for which, answers in progress.unconfirmed.items()}
-    assert (told, progress.answers["thick"].value) == ({(4, 1): 6, (4, 2): 2}, 2)
+    unconfirmed = {which: answers["thick"].value for which, answers in progress.unconfirmed.items()}
+    assert (unconfirmed, progress.answers["thick"].value) == ({(4, 1): 6, (4, 2): 2}, 2)
     progress.process_line(event_of("page_shown", page="rest"))
     assert (progress.answers, progress.unconfirmed.keys()) == ({}, {(4, 1), (4, 2)})
 
@@ -291,12 +291,12 @@ def test_a_recording_covers_a_trial_or_each_of_its_intervals() -> None:
 
 def test_results_are_those_of_the_last_attempt_by_number_and_only_of_trials_with_a_design() -> None:
     protocol = study()
-    told = {"block": "viscosity", "code": "V1", "phase": "main"}
+    fields = {"block": "viscosity", "code": "V1", "phase": "main"}
 
     def presented(trial: int, attempt: int, level: float, arrangement: str | None, answer: str | None) -> list[Event]:
         which = {"trial": trial, "attempt": attempt}
         items = [] if answer is None else [{"item": "which", "value": answer}]
-        start = event_of("trial_started", **which, **told, level=level, standard=1.0, arrangement=arrangement)
+        start = event_of("trial_started", **which, **fields, level=level, standard=1.0, arrangement=arrangement)
         return [start, event_of("responses", **which, items=items)]
 
     lines = presented(7, 1, 0.8, "CS", "first")

@@ -23,9 +23,9 @@ FACTS = {"participant": "P007", "session": 1}
 
 @pytest.fixture
 def recorder(tmp_path: Path) -> Iterator[Recorder]:
-    made = Recorder(tmp_path / "recordings", FACTS)
-    yield made
-    made.close()
+    open_recorder = Recorder(tmp_path / "recordings", FACTS)
+    yield open_recorder
+    open_recorder.close()
 
 
 class Disk:
@@ -67,24 +67,26 @@ def test_a_trial_is_on_the_disk_under_its_name_after_its_end(
     samples = samples_of(70_001)
     record(recorder, samples, chunk=1_234, video=SimpleNamespace(number=5, due_ns=1_400, age_ns=70))
     recorder.close()
-    (kept,) = recorder.collect_results()
-    assert isinstance(kept, Recorded)
-    videos = read_frames(tmp_path / kept.recording_frames)[["video_frame", "video_ns", "video_age_ns"]]
-    assert [tuple(each) for each in videos.tolist()] == [(-1, 0, -1), (5, 1_400, 70)]
-    assert (kept.trial, kept.attempt, kept.samples_unrecorded, kept.samples_recorded, kept.frames_recorded) == (
-        3,
-        1,
-        0,
-        70_001,
-        2,
-    )
+    (recording,) = recorder.collect_results()
+    assert isinstance(recording, Recorded)
+    videos = read_frames(tmp_path / recording.recording_frames)[["video_frame", "video_ns", "video_age_ns"]]
+    assert [tuple(row) for row in videos.tolist()] == [(-1, 0, -1), (5, 1_400, 70)]
+    assert (
+        recording.trial,
+        recording.attempt,
+        recording.samples_unrecorded,
+        recording.samples_recorded,
+        recording.frames_recorded,
+    ) == (3, 1, 0, 70_001, 2)
     assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == [
         "trial-003.parquet",
         "trial-003_frames.parquet",
     ]
-    assert np.array_equal(read_samples(tmp_path / kept.recording)["position_m"], samples["position_m"])
-    assert read_frames(tmp_path / kept.recording_frames)["age_ns"].tolist() == [1_000, 1_500]
-    assert read_facts(tmp_path / kept.recording).items() >= {**FACTS, "trial": 3, "attempt": 1, "dropped": 0}.items()
+    assert np.array_equal(read_samples(tmp_path / recording.recording)["position_m"], samples["position_m"])
+    assert read_frames(tmp_path / recording.recording_frames)["age_ns"].tolist() == [1_000, 1_500]
+    assert (
+        read_facts(tmp_path / recording.recording).items() >= {**FACTS, "trial": 3, "attempt": 1, "dropped": 0}.items()
+    )
     assert recorder.collect_results() == ()
 
 
@@ -94,16 +96,18 @@ def test_beginning_the_next_trial_ends_the_one_before(recorder: Recorder, sample
     recorder.start(2, 1, 1000.0)
     recorder.append(samples_of(20))
     recorder.close()
-    assert [kept.samples_recorded for kept in recorder.collect_results() if isinstance(kept, Recorded)] == [10, 20]
+    assert [
+        recording.samples_recorded for recording in recorder.collect_results() if isinstance(recording, Recorded)
+    ] == [10, 20]
     record(recorder, samples_of(10))  # after its end
     recorder.close()
     assert recorder.collect_results() == ()
 
 
-def test_a_disk_that_stands_still_holds_nobody_up_and_drops_are_counted(
+def test_a_stalled_disk_does_not_block_and_dropped_samples_are_counted(
     tmp_path: Path, samples_of: Make, disk: Disk
 ) -> None:
-    """Handing over goes on in this thread while the other waits for the disk; what finds no room is counted."""
+    """Samples are handed over while the other thread waits for the disk; samples without room are counted."""
     recorder = Recorder(tmp_path / "recordings", FACTS, room=40_000)
     recorder.start(1, 1, 1000.0)
     samples = samples_of(100_000)
@@ -114,20 +118,20 @@ def test_a_disk_that_stands_still_holds_nobody_up_and_drops_are_counted(
     assert recorder.dropped == 30_000
     disk.works.set()
     recorder.close()
-    (kept,) = recorder.collect_results()
-    assert isinstance(kept, Recorded)
-    assert (kept.samples_unrecorded, kept.samples_recorded) == (30_000, 70_000)
-    assert read_samples(tmp_path / kept.recording)["tick"].tolist() == list(range(70_000))
-    assert read_facts(tmp_path / kept.recording)["dropped"] == 30_000
+    (recording,) = recorder.collect_results()
+    assert isinstance(recording, Recorded)
+    assert (recording.samples_unrecorded, recording.samples_recorded) == (30_000, 70_000)
+    assert read_samples(tmp_path / recording.recording)["tick"].tolist() == list(range(70_000))
+    assert read_facts(tmp_path / recording.recording)["dropped"] == 30_000
 
 
 def test_in_a_rehearsal_handing_over_waits_for_room_instead(tmp_path: Path, samples_of: Make) -> None:
     recorder = Recorder(tmp_path / "recordings", FACTS, waits=True, room=500)
     record(recorder, samples_of(90_000), chunk=700)
     recorder.close()
-    (kept,) = recorder.collect_results()
-    assert isinstance(kept, Recorded)
-    assert (kept.samples_unrecorded, kept.samples_recorded) == (0, 90_000)
+    (recording,) = recorder.collect_results()
+    assert isinstance(recording, Recorded)
+    assert (recording.samples_unrecorded, recording.samples_recorded) == (0, 90_000)
 
 
 @pytest.mark.parametrize("size", [200, 500_000], ids=["from the first byte", "after a while"])
@@ -142,8 +146,8 @@ def test_a_full_disk_loses_a_recording_with_its_reason_and_the_next_is_kept(
     assert recorder.collect_results() == (lost_event((1, 1, None), "File too large"),)
     record(recorder, samples_of(200), trial=2)
     recorder.close()
-    (kept,) = recorder.collect_results()
-    assert isinstance(kept, Recorded)
+    (recording,) = recorder.collect_results()
+    assert isinstance(recording, Recorded)
     assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == [
         "trial-002.parquet",
         "trial-002_frames.parquet",
@@ -156,7 +160,7 @@ def test_the_folder_is_on_the_disk_before_its_first_file(
     flushed: list[tuple[Path, list[str]]] = []
     monkeypatch.setattr(
         "study_app.store.recorder.sync_folder",
-        lambda path: flushed.append((path, [one.name for one in (path / "recordings").iterdir()])),
+        lambda path: flushed.append((path, [file.name for file in (path / "recordings").iterdir()])),
     )
     record(recorder, samples_of(200), trial=1)
     record(recorder, samples_of(200), trial=2)
@@ -178,7 +182,7 @@ def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of:
     assert list((tmp_path / "recordings").iterdir()) == [], "it was said to be lost"
 
 
-def test_a_disk_that_never_comes_back_is_given_up_without_waiting(
+def test_a_permanently_stalled_disk_is_abandoned_without_waiting(
     tmp_path: Path, samples_of: Make, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recorder = Recorder(tmp_path / "recordings", FACTS)
@@ -220,10 +224,10 @@ def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_an
         recorder.stop()
     record(recorder, samples_of(20), trial=2)
     recorder.close()
-    missing, kept = recorder.collect_results()
+    missing, recording = recorder.collect_results()
     assert missing == lost_event((1, 1, None), "its thread ended (Ended: pulled)")
-    assert isinstance(kept, Recorded)
-    assert (kept.trial, kept.samples_recorded) == (2, 20)
+    assert isinstance(recording, Recorded)
+    assert (recording.trial, recording.samples_recorded) == (2, 20)
 
 
 def test_a_thread_that_cannot_be_started_loses_recordings_and_not_the_session(
@@ -235,14 +239,14 @@ def test_a_thread_that_cannot_be_started_loses_recordings_and_not_the_session(
     with monkeypatch.context() as patched:
         patched.setattr(threading.Thread, "start", refuses)
         record(recorder, samples_of(10), trial=1)
-    assert [one.trial for one in recorder.lost] == [1]
+    assert [lost_recording.trial for lost_recording in recorder.lost] == [1]
     assert "can't start new thread" in recorder.lost[0].reason
     record(recorder, samples_of(20), trial=2)
     recorder.close()
-    assert [type(kept) for kept in recorder.collect_results()] == [RecordingLost, Recorded]
+    assert [type(result) for result in recorder.collect_results()] == [RecordingLost, Recorded]
 
 
-def test_the_journal_says_which_files_with_how_many_rows_and_hashes_belong_to_which_attempt(tmp_path: Path) -> None:
+def test_the_journal_lists_files_rows_and_hashes_of_each_attempt(tmp_path: Path) -> None:
     folder = tmp_path / "recordings"
     samples = WrittenFile(folder / "a.parquet", 900, "aa", "bb")
     frames = WrittenFile(folder / "a_frames.parquet", 54, "cc", "dd")
@@ -282,7 +286,7 @@ def test_without_a_running_recording_samples_and_frames_are_dropped(recorder: Re
     assert (recorder.thread, recorder.collect_results()) == (None, ()), "and it stays closed"
 
 
-def test_an_interval_of_an_attempt_is_told_in_its_facts_and_its_frames_begin_anew(
+def test_the_facts_of_a_recording_state_its_interval_and_its_frames_start_anew(
     tmp_path: Path, recorder: Recorder, samples_of: Make
 ) -> None:
     for interval in (1, 2):
@@ -294,10 +298,14 @@ def test_an_interval_of_an_attempt_is_told_in_its_facts_and_its_frames_begin_ane
     first, second = recorder.collect_results()
     assert isinstance(first, Recorded)
     assert isinstance(second, Recorded)
-    assert [(kept.which, kept.samples_recorded, kept.frames_recorded) for kept in (first, second)] == [
+    counts = [(recording.which, recording.samples_recorded, recording.frames_recorded) for recording in (first, second)]
+    assert counts == [
         ((3, 2, 1), 20, 1), ((3, 2, 2), 40, 1),
     ]  # fmt: skip
-    for kept, interval in ((first, 1), (second, 2)):
-        assert read_facts(tmp_path / kept.recording).items() >= {"trial": 3, "attempt": 2, "interval": interval}.items()
-        assert read_frames(tmp_path / kept.recording_frames)["age_ns"].tolist() == [interval]
+    for recording, interval in ((first, 1), (second, 2)):
+        assert (
+            read_facts(tmp_path / recording.recording).items()
+            >= {"trial": 3, "attempt": 2, "interval": interval}.items()
+        )
+        assert read_frames(tmp_path / recording.recording_frames)["age_ns"].tolist() == [interval]
     assert (recorder.lost, recorder.dropped) == ((), 0)

@@ -35,7 +35,7 @@ STUDIES = [
 
 
 @pytest.fixture(params=STUDIES, ids="-".join)
-def held(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, dict[str, tuple[str, int]]]:
+def recorded_study(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, dict[str, tuple[str, int]]]:
     """Return an upgraded copy of a recorded study, and status and number of answers of each participant."""
     version, study = request.param
     expected = json.loads((RELEASES / version / "expected.json").read_text("utf-8"))[study]
@@ -67,23 +67,25 @@ def written_by(folder: Path) -> list[str]:
     return [json.loads(path.read_text("utf-8"))["versions"]["liquid-study"] for path in folder.rglob("receipt.json")]
 
 
-def test_it_is_sound_but_for_what_is_unfinished(held: tuple[Path, dict[str, tuple[str, int]]]) -> None:
-    folder, expected = held
-    found = verify_study(folder)
-    assert found.errors == ()
-    said = "\n".join(map(str, found.warnings))
+def test_a_released_study_is_sound_except_for_unfinished_sessions(
+    recorded_study: tuple[Path, dict[str, tuple[str, int]]],
+) -> None:
+    folder, expected = recorded_study
+    verification = verify_study(folder)
+    assert verification.errors == ()
+    message = "\n".join(map(str, verification.warnings))
     for participant, (status, _) in expected.items():
-        assert (f"sub-{participant}/ses-01: is unfinished" in said) == (status == "unfinished")
+        assert (f"sub-{participant}/ses-01: is unfinished" in message) == (status == "unfinished")
 
 
 def test_every_answer_is_exported_and_the_report_is_whole(
-    held: tuple[Path, dict[str, tuple[str, int]]], tmp_path: Path
+    recorded_study: tuple[Path, dict[str, tuple[str, int]]], tmp_path: Path
 ) -> None:
-    folder, expected = held
+    folder, expected = recorded_study
     unblind(folder, by="AB", reason="a test")
-    written = export(folder, tmp_path / "tables")
+    exported_files = export(folder, tmp_path / "tables")
     assert json.loads((tmp_path / "tables" / "codebook.json").read_text("utf-8"))["doubts"] == []
-    (table,) = [path for path in written if path.name.endswith("responses_data.csv")]
+    (table,) = [path for path in exported_files if path.name.endswith("responses_data.csv")]
     counts = pd.read_csv(table, dtype=str).groupby("participant").size()
     assert {name: int(counts.get(name, 0)) for name in expected} == {
         name: count for name, (_, count) in expected.items()
@@ -91,9 +93,9 @@ def test_every_answer_is_exported_and_the_report_is_whole(
     failed: list[str] = []
     assert report(folder, tmp_path / "report", failed=failed.append)[0].name == "report.html"
     assert failed == []
-    (ran,) = set(written_by(folder))
+    (version,) = set(written_by(folder))
     methods = (tmp_path / "report" / "methods.txt").read_text("utf-8")
-    analysed = "" if ran == __version__ else f" with liquid-study {ran}", f" with liquid-study {__version__}"
+    analysed = "" if version == __version__ else f" with liquid-study {version}", f" with liquid-study {__version__}"
     assert f"The sessions were run{analysed[0]} and analysed{analysed[1]}." in methods
 
 
@@ -101,12 +103,12 @@ def test_every_answer_is_exported_and_the_report_is_whole(
 @pytest.mark.parametrize("session", RECORDED, ids=lambda path: path.parts[-4])
 def test_its_recordings_give_the_same_forces(session: Path) -> None:
     """The code of 0.2 recorded "honey" and "light_oil" (`recorded_sessions.stressed`)."""
-    found = replay(session)
-    differences = found.differences
+    replay_result = replay(session)
+    differences = replay_result.differences
     if sys.platform != "linux":  # another library rounds exp() differently: forces agree as rounded
         differences = tuple(text for text in differences if "column" in text)
-    assert (differences, found.uncompared) == ((), ())
-    assert found.recordings == len(list(session.glob("recordings/trial-???.parquet"))) > 0
+    assert (differences, replay_result.uncompared) == ((), ())
+    assert replay_result.recordings == len(list(session.glob("recordings/trial-???.parquet"))) > 0
 
 
 @needs_servo
@@ -143,17 +145,17 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return upgraded_results(HELD / "rek2024", tmp_path_factory.mktemp("earlier") / "study")
 
 
-def warned(study: Path) -> str:
+def warnings_text(study: Path) -> str:
     findings = verify_study(study)
     assert findings.errors == ()
     assert findings.is_sound
     return "\n".join(map(str, findings.warnings))
 
 
-def test_it_verifies_with_a_note(study: Path) -> None:
-    found = warned(study)
-    assert "data: 2 journals are in format 1, which cannot show whether an earlier line was changed" in found
-    assert f"{KILLED}: is unfinished but can be resumed" in found
+def test_a_released_study_verifies_with_a_note_on_its_journal_format(study: Path) -> None:
+    warning_text = warnings_text(study)
+    assert "data: 2 journals are in format 1, which cannot show whether an earlier line was changed" in warning_text
+    assert f"{KILLED}: is unfinished but can be resumed" in warning_text
     changed = StudyFolder(study).session("P001", 1).journal
     content = changed.read_bytes()
     changed.write_bytes(content.replace(b'"value":4', b'"value":5', 1))
@@ -162,7 +164,7 @@ def test_it_verifies_with_a_note(study: Path) -> None:
 
 
 @needs_servo
-def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path, tmp_path: Path) -> None:
+def test_a_released_session_is_resumed_with_a_hash_chain_over_the_earlier_lines(study: Path, tmp_path: Path) -> None:
     folder = StudyFolder(study).session("P002", 1)
     before = folder.journal.read_bytes()
     rehearsal.resume_rehearsal(folder.path, protocol=upgraded(HELD / "rek2024.toml", tmp_path))
@@ -172,7 +174,7 @@ def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path, tm
     resumed = next(line["n"] for line in lines if line["event"] == "session_resumed")
     assert [line["n"] for line in lines if "previous" in line] == list(range(resumed, len(lines) + 1))
     assert len(StudyFolder(study).fingerprints.read_text("utf-8").splitlines()) == 1
-    assert "data: 1 journal is in format 1" in warned(study)
+    assert "data: 1 journal is in format 1" in warnings_text(study)
     content = folder.journal.read_bytes()
     folder.journal.write_bytes(content.replace(b'"value":4', b'"value":5', 1))  # in a line of format 1
     damage = journal.scan(folder.journal).damage

@@ -49,18 +49,18 @@ def session_of(study: Path) -> Path:
 def test_files_of_systems_are_noted_and_leave_the_fingerprint(study: Path) -> None:
     for name in (*OF_SYSTEMS, *HIDDEN):
         (session_of(study) / name).write_bytes(b"\0")
-    found = verify_study(study)
-    assert found.errors == ()
-    assert {Path(one.place).name for one in found.warnings} == {Path(name).name for name in OF_SYSTEMS}
+    verification = verify_study(study)
+    assert verification.errors == ()
+    assert {Path(warning.place).name for warning in verification.warnings} == {Path(name).name for name in OF_SYSTEMS}
     added = (
         "more.csv", "receipt.txt", "journal.jsonl.orig", "recordings/trial-099.parquet",
         "recordings/trial-001_attempt-2.parquet", "recordings/trial-001_extra.parquet",
     )  # fmt: skip
     for name in added:
         (session_of(study) / name).write_bytes(b"1\n")
-    said = {one.place: one.message for one in verify_study(study).errors}
-    assert all(any(place.endswith(name) for place in said) for name in added)
-    assert not any("fingerprints.txt" in message for message in said.values())
+    messages = {error.place: error.message for error in verify_study(study).errors}
+    assert all(any(place.endswith(name) for place in messages) for name in added)
+    assert not any("fingerprints.txt" in message for message in messages.values())
 
 
 def test_copies_of_a_studys_lists_are_noted_and_their_content_is_ignored(study: Path) -> None:
@@ -85,15 +85,15 @@ def test_copies_of_a_studys_lists_are_noted_and_their_content_is_ignored(study: 
     assert [row.reason for row in exclusions(study)] == ["x"]
 
 
-def test_copies_of_sessions_are_no_sessions(study: Path) -> None:
+def test_copies_of_session_folders_are_ignored_with_a_warning(study: Path) -> None:
     shutil.copytree(session_of(study).parent, study / "data" / "sub-P001 (AB's conflicted copy 2026-01-02)")
     shutil.copytree(session_of(study), session_of(study).parent / "ses-01 (1)")
-    found = verify_study(study)
-    assert found.errors == ()
-    assert [one.message for one in found.warnings] == [
+    verification = verify_study(study)
+    assert verification.errors == ()
+    assert [warning.message for warning in verification.warnings] == [
         "is ignored because it is not a session folder; it may be a copy of one"
     ] * 2
-    assert found.sessions == 1
+    assert verification.sessions == 1
 
 
 def test_a_file_of_a_system_that_the_list_has_belongs_to_the_fingerprint(tmp_path: Path) -> None:
@@ -102,16 +102,20 @@ def test_a_file_of_a_system_that_the_list_has_belongs_to_the_fingerprint(tmp_pat
     sums = session_of(study) / "checksums.sha256"
     (session_of(study) / "desktop.ini").write_bytes(b"[.ShellClassInfo]\n")
     sums.write_text(f"{sums.read_text('utf-8')}{'0' * 64}  desktop.ini\n", encoding="utf-8", newline="\n")
-    assert any(one.place.endswith("desktop.ini") and "has changed" in one.message for one in verify_study(study).errors)
+    assert any(
+        error.place.endswith("desktop.ini") and "has changed" in error.message for error in verify_study(study).errors
+    )
 
 
 def test_line_endings_that_git_changed_are_named(study: Path) -> None:
     for path in session_of(study).glob("*.*"):
         if path.suffix != ".sha256":
             path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
-    said = [one.message for one in verify_study(study).errors]
-    assert any("line endings have been changed to CR LF, as git does with core.autocrlf" in message for message in said)
-    assert not any("another line" in message for message in said)
+    messages = [error.message for error in verify_study(study).errors]
+    assert any(
+        "line endings have been changed to CR LF, as git does with core.autocrlf" in message for message in messages
+    )
+    assert not any("another line" in message for message in messages)
 
 
 NOTED = {
@@ -126,9 +130,9 @@ def test_each_file_that_an_editor_saved_otherwise_is_read_or_named(study: Path, 
     def errors_with(path: Path, content: bytes) -> list[str]:
         before = path.read_bytes()
         path.write_bytes(content)
-        said = [one.message for one in verify_study(study).errors if Path(one.place).name == path.name]
+        messages = [error.message for error in verify_study(study).errors if Path(error.place).name == path.name]
         path.write_bytes(before)
-        return said
+        return messages
 
     exclude(study, "P001", 1, by="AB", reason="x")
     include(study, "P001", 1, by="AB", reason="x")
@@ -140,13 +144,13 @@ def test_each_file_that_an_editor_saved_otherwise_is_read_or_named(study: Path, 
     assert {path.name for path in files} >= set(NOTED)
     for path in files:
         content = path.read_bytes()
-        said = errors_with(path, mark + content if mark else content.replace(b"\n", b"\r\n"))
-        named = "byte order mark" if mark else "line endings"
+        messages = errors_with(path, mark + content if mark else content.replace(b"\n", b"\r\n"))
+        expected_message = "byte order mark" if mark else "line endings"
         if path.name in NOTED:
-            assert said == [], path
+            assert messages == [], path
         else:
-            assert said, path
-            assert all(named in message for message in said), (path, said)
+            assert messages, path
+            assert all(expected_message in message for message in messages), (path, messages)
 
 
 def test_a_study_has_one_hash_with_any_line_endings() -> None:
@@ -164,22 +168,22 @@ def test_results_below_a_folder_that_is_not_utf_8_are_exported(study: Path, tmp_
     there = study.rename(folder / "study")
     for words in (["verify"], ["export", "--to", str(folder / "tables")], ["report", "--to", str(folder / "report")]):
         command = [sys.executable, "-m", "study_app", words[0], there, *words[1:]]
-        done = subprocess.run(command, check=False, capture_output=True)
-        assert (done.returncode, done.stderr) == (0, b"")
+        process = subprocess.run(command, check=False, capture_output=True)
+        assert (process.returncode, process.stderr) == (0, b"")
     assert list((folder / "tables").glob("*_data.csv"))
     assert (folder / "report" / "report.html").is_file()
 
 
 @pytest.mark.skipif(not hasattr(time, "tzset"), reason="time zones are set for the process")
 def test_sessions_are_listed_in_local_time(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    said = {}
+    times_of = {}
     for zone in ("America/New_York", "Asia/Kolkata"):
         monkeypatch.setenv("TZ", zone)
         time.tzset()
-        said[zone] = CliRunner().invoke(commands, ["sessions", str(study)], catch_exceptions=False).output.split()
+        times_of[zone] = CliRunner().invoke(commands, ["sessions", str(study)], catch_exceptions=False).output.split()
     monkeypatch.undo()
     time.tzset()
-    assert said["America/New_York"][2][-6:] in {"-05:00", "-04:00"}
-    assert said["Asia/Kolkata"][2][-6:] == "+05:30"
-    began = {datetime.fromisoformat(f"{words[1]}T{words[2]}") for words in said.values()}
+    assert times_of["America/New_York"][2][-6:] in {"-05:00", "-04:00"}
+    assert times_of["Asia/Kolkata"][2][-6:] == "+05:30"
+    began = {datetime.fromisoformat(f"{words[1]}T{words[2]}") for words in times_of.values()}
     assert len(began) == 1

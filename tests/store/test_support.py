@@ -14,7 +14,7 @@ from study_app import cli
 from study_app.errors import DeviceLost, StoreError, StudyError
 from study_app.program_log import DEVICE_FAILED, last_error, log_file, read_log, start_log
 from study_app.store import workstation
-from study_app.store.support import write_support
+from study_app.store.support import write_support_archive
 from study_app.store.workstation import DeviceBench, MachineSettings
 from study_app.workspace import WORKSPACE_VARIABLE
 
@@ -49,7 +49,7 @@ def fails() -> None:
 
 
 def plant(caplog: pytest.LogCaptureFixture) -> None:
-    """Log what a session may log when it breaks, with ids, answers, values and folders in it."""
+    """Log messages of a failing session that contain ids, answers, values and folders."""
     try:
         fails()
     except ValueError as error:
@@ -61,7 +61,7 @@ def plant(caplog: pytest.LogCaptureFixture) -> None:
     caplog.clear()
 
 
-def test_nothing_of_a_study_is_in_it(
+def test_the_support_file_contains_no_study_data(
     logged: logging.Logger, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv(WORKSPACE_VARIABLE)
@@ -103,31 +103,31 @@ def test_nothing_of_a_study_is_in_it(
     plant(caplog)
     monkeypatch.setenv("HOME", str(results.parent))
     monkeypatch.setenv("USERPROFILE", str(results.parent))
-    write_support(tmp_path / "help.zip", f"1  FOUND  no reply, see {results / 'bench.md'}\n")
-    found = members(tmp_path / "help.zip")
-    everything = "\n".join((*found, *found.values()))
+    write_support_archive(tmp_path / "help.zip", f"1  FOUND  no reply, see {results / 'bench.md'}\n")
+    content = members(tmp_path / "help.zip")
+    everything = "\n".join((*content, *content.values()))
     assert [word for word in PLANTED if word in everything] == []
-    assert set(found) == {
+    assert set(content) == {
         *("README.txt", "versions.json", "settings.json", "log.txt", "last-error.txt", "diagnosis.txt"),
         *(f"crash-{number}.txt" for number in (1, 2, 3)),
     }
     assert "tests/store/test_support.py" not in everything  # outside the package: the file's name alone
-    assert "the session failed: ValueError" in found["log.txt"]
-    assert "the panel … failed: … times" in found["last-error.txt"]
-    assert "test_support.py:" in found["last-error.txt"]
-    assert "in fails" in found["last-error.txt"]
-    assert found["diagnosis.txt"] == f"1  FOUND  no reply, see {Path('~/results/bench.md')}\n"
-    assert '"study_app/app/session/bridge.py"' in found["crash-1.txt"]
-    older = [found[f"crash-{number}.txt"] for number in (2, 3)]
+    assert "the session failed: ValueError" in content["log.txt"]
+    assert "the panel … failed: … times" in content["last-error.txt"]
+    assert "test_support.py:" in content["last-error.txt"]
+    assert "in fails" in content["last-error.txt"]
+    assert content["diagnosis.txt"] == f"1  FOUND  no reply, see {Path('~/results/bench.md')}\n"
+    assert '"study_app/app/session/bridge.py"' in content["crash-1.txt"]
+    older = [content[f"crash-{number}.txt"] for number in (2, 3)]
     assert older == [f'  File "study_app/a.py", line {number} in b' for number in (5, 4)]
-    settings = json.loads(found["settings.json"])
+    settings = json.loads(content["settings.json"])
     names = ("operator", "workspace", "firmware", "recent", "camera", "proofs", "stamps", "stamp_root")
     assert ({settings[name] for name in names}, settings["device"], "problem" in settings) == ({True}, "mouse", False)
     assert settings["benches"][0]["mass_kg"] == list(axes)
-    assert json.loads(found["versions.json"]).keys() >= {"liquid-study", "python", "system", "numba", "pyusb"}
+    assert json.loads(content["versions.json"]).keys() >= {"liquid-study", "python", "system", "numba", "pyusb"}
 
 
-def test_a_failure_of_the_device_is_told_in_full_and_is_the_last_error(
+def test_the_support_file_contains_the_full_device_failure_as_the_last_error(
     logged: logging.Logger, caplog: pytest.LogCaptureFixture
 ) -> None:
     log.error("a bug")
@@ -159,7 +159,7 @@ def test_the_log_is_kept_within_bounds_and_one_that_cannot_be_written_disturbs_n
 def test_the_doctor_writes_one(tmp_path: Path) -> None:
     pytest.importorskip("numba")
     words = ["devices", "doctor", "--device", "falcon-emulated", "--fault", "unplugged", "--to"]
-    ran = CliRunner().invoke(cli.commands, [*words, str(tmp_path / "a.zip")])
-    assert ran.exit_code == 3, ran.output
-    assert f"Written: {tmp_path / 'a.zip'}" in ran.output
+    result = CliRunner().invoke(cli.commands, [*words, str(tmp_path / "a.zip")])
+    assert result.exit_code == 3, result.output
+    assert f"Written: {tmp_path / 'a.zip'}" in result.output
     assert "FAULT" in members(tmp_path / "a.zip")["diagnosis.txt"]

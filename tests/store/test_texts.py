@@ -31,7 +31,7 @@ RIGHT = dict(zip(header(COLUMNS), ("x", "7", "0.5", "true", "low", "2026-03-01T1
 
 
 def line(fields: dict[str, Any], **more: Any) -> tuple[str | None, bool]:
-    """Return what is wrong with a line of a journal, and whether the schema refuses it."""
+    """Return the problem of a journal line, and whether the schema refuses it."""
     return line_problem(fields | more), any(Draft7Validator(journal_schema()).iter_errors(fields | more))
 
 
@@ -47,15 +47,15 @@ def cell(column: str, text: str) -> tuple[list[str], bool]:
 
 
 def settings(content: bytes) -> str:
-    """Return what is said of a file of settings."""
+    """Return the messages about a settings file."""
     settings_file().parent.mkdir(exist_ok=True)
     settings_file().write_bytes(content)
-    found, said = load_or_default()
-    assert found == DEFAULTS
+    loaded, messages = load_or_default()
+    assert loaded == DEFAULTS
     save_settings(MachineSettings(screen="DP-1", theme="dark"))
     assert load_settings() == MachineSettings(screen="DP-1", theme="dark")
     assert settings_file().with_name(ASIDE).read_bytes() == content
-    return re.sub(r"\(Expecting .*\)", "(...)", said.replace(str(settings_file()), "FILE"))
+    return re.sub(r"\(Expecting .*\)", "(...)", messages.replace(str(settings_file()), "FILE"))
 
 
 def screen(*there: str, **chosen: Any) -> int:
@@ -63,11 +63,11 @@ def screen(*there: str, **chosen: Any) -> int:
 
 
 NAMES = {"ALL": ALL, "LONG": 999 * "x"}
-NAMES |= {one.__name__: one for one in (line, cell, guard_formula, settings, screen, check_participant)}
+NAMES |= {function.__name__: function for function in (line, cell, guard_formula, settings, screen, check_participant)}
 
 
 @pytest.mark.parametrize("file", sorted((Path(__file__).parent / "texts").iterdir()), ids=lambda file: file.stem)
-def test_what_is_said_of_a_text(
+def test_texts_are_checked_and_guarded_as_recorded(
     file: Path, protocol: Protocol, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config
 ) -> None:
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))

@@ -90,9 +90,9 @@ def test_a_file_without_a_table_of_settings_is_refused_by_name_and_the_defaults_
         f"this machine's settings in {file} cannot be used: {reason}. Correct or delete the file, or set "
         "LIQUID_STUDY_CONFIG to another folder"
     )
-    with pytest.raises(StoreError) as refused:
+    with pytest.raises(StoreError) as error:
         load_settings()
-    assert str(refused.value) == message
+    assert str(error.value) == message
     assert load_or_default() == (DEFAULTS, message)
     assert device_without_force() == ""
     save_settings(ALL)
@@ -100,7 +100,7 @@ def test_a_file_without_a_table_of_settings_is_refused_by_name_and_the_defaults_
     assert (folder / ASIDE).read_text("utf-8") == content
 
 
-def test_a_device_that_renders_no_force_is_named_once_it_is_chosen():
+def test_a_chosen_device_without_force_is_named():
     assert (DEFAULTS.device, device_without_force()) == ("mouse", "")
     names = {"spacemouse": "SpaceMouse", "falcon": "", "mouse": "Mouse", "spacemouse:left": "SpaceMouse"}
     for device, name in names.items():
@@ -124,15 +124,20 @@ def test_only_the_newest_eight_protocols_outside_the_workspace_are_recent(tmp_pa
     assert [Path(name).stem for name in load_settings().recent] == ["4", "9", "8", "7", "6", "5", "3", "2"]
 
 
-def test_a_measurement_replaces_that_of_the_same_device_alone():
+def test_a_measurement_replaces_only_that_of_the_same_device():
     zeros = dict.fromkeys(("mass_kg", "damping_nspm", "friction_n", "delay_ms", "stable_nspm"), (0.0, 0.0, 0.0))
-    made = (("falcon", "7", "Monday"), ("falcon", "8", "Tuesday"), ("mouse", "", "Friday"), ("falcon", "7", "Sunday"))
+    measurements = (
+        ("falcon", "7", "Monday"),
+        ("falcon", "8", "Tuesday"),
+        ("mouse", "", "Friday"),
+        ("falcon", "7", "Sunday"),
+    )
     settings = DEFAULTS
-    for name, serial, day in made:
+    for name, serial, day in measurements:
         settings = settings.with_bench(DeviceBench(name=name, serial=serial, measured=day, **zeros))
     assert [bench.measured for bench in settings.benches] == ["Sunday", "Friday", "Tuesday"]
-    described = ({"name": "falcon", "serial": "8"}, {"name": "mouse", "serial": None}, {"name": "falcon"})
-    assert [getattr(settings.bench_of(device), "measured", None) for device in described] == ["Tuesday", "Friday", None]
+    devices = ({"name": "falcon", "serial": "8"}, {"name": "mouse", "serial": None}, {"name": "falcon"})
+    assert [getattr(settings.bench_of(device), "measured", None) for device in devices] == ["Tuesday", "Friday", None]
 
 
 def test_a_chosen_workspace_is_created_and_kept_with_the_other_settings(tmp_path):
@@ -152,11 +157,11 @@ def test_an_x_is_seen_under_four_tenths_of_a_degree_or_more(distance, width, pix
     settings = MachineSettings(viewing_distance_mm=distance, screen_width_mm=width)
     scale = settings.text_scale(pixels, 0.0)
     height_mm = scale * STATEMENT_X_HEIGHT_PX * width / pixels
-    seen = math.degrees(2 * math.atan(height_mm / (2 * distance)))
+    angle_degrees = math.degrees(2 * math.atan(height_mm / (2 * distance)))
     assert scale >= 1.0
-    assert seen >= LEAST_X_HEIGHT_DEG * 0.9999  # a tangent of so small an angle is all but the angle
+    assert angle_degrees >= LEAST_X_HEIGHT_DEG * 0.9999  # a tangent of so small an angle is all but the angle
     if scale > 1:
-        assert seen == pytest.approx(LEAST_X_HEIGHT_DEG, rel=1e-4)
+        assert angle_degrees == pytest.approx(LEAST_X_HEIGHT_DEG, rel=1e-4)
 
 
 def test_words_are_as_designed_until_the_distance_is_known():
@@ -167,7 +172,7 @@ def test_words_are_as_designed_until_the_distance_is_known():
     assert known.model_copy(update={"screen_width_mm": 1054.0}).text_scale(1920, 527.0) == 1.0
 
 
-def test_the_receipt_gets_the_offset_of_the_screen_it_was_measured_on_alone():
+def test_the_receipt_gets_the_offset_only_for_the_measured_screen():
     there, elsewhere = ALL.describe("DP-1", 1920, 500.0), ALL.describe("HDMI-1", 1920, 500.0)
     assert there["display_offset"] == {"mean_ms": 23.5, "spread_ms": 1.2, "how": "photodiode", "measured": "2026-11-20"}
     assert elsewhere["display_offset"] is None

@@ -23,19 +23,19 @@ ACCEPT_S = 20.0
 
 
 class Sent:
-    """What is written goes to a socket."""
+    """A file whose output goes to a socket."""
 
     def __init__(self, to: socket.socket) -> None:
         self._to = to
 
     def write(self, content: bytes) -> int:
-        """Send all."""
+        """Send all bytes."""
         self._to.sendall(content)
         return len(content)
 
 
 def main() -> None:
-    """Send."""
+    """Send the frames."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--age-ms", type=float, default=0.0)
@@ -43,10 +43,10 @@ def main() -> None:
     parser.add_argument("--lose", type=int, default=0)
     parser.add_argument("--relative", action="store_true")
     parser.add_argument("--print", action="store_true", dest="prints")
-    asked = parser.parse_args()
-    width, height = map(int, asked.size.split("x"))
-    pictures = [picture(number, (width, height)) for number in range(round(RATE_HZ * asked.seconds))]
-    frames = [av.VideoFrame.from_ndarray(one, "rgb24").reformat(format="yuvj420p") for one in pictures]
+    arguments = parser.parse_args()
+    width, height = map(int, arguments.size.split("x"))
+    pictures = [picture(number, (width, height)) for number in range(round(RATE_HZ * arguments.seconds))]
+    frames = [av.VideoFrame.from_ndarray(image, "rgb24").reformat(format="yuvj420p") for image in pictures]
     sent: list[str] = []
     microsecond = Fraction(1, 1_000_000)
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -64,14 +64,14 @@ def main() -> None:
         for number, frame in enumerate(frames):
             time.sleep(max(0.0, began + number / RATE_HZ - time.perf_counter()))
             now = time.perf_counter()
-            stamp = now - began if asked.relative else now - 1e-3 * asked.age_ms
+            stamp = now - began if arguments.relative else now - 1e-3 * arguments.age_ms
             frame.pts, frame.time_base = round(1e6 * stamp), microsecond
             packets = stream.encode(frame)
-            if asked.lose and number % asked.lose == asked.lose - 1:
+            if arguments.lose and number % arguments.lose == arguments.lose - 1:
                 continue
             sent.append(f"{number} {time.perf_counter()}")
             container.mux(packets)
-    if asked.prints:
+    if arguments.prints:
         sys.stdout.write("\n".join(sent))
 
 

@@ -35,26 +35,26 @@ def sending(*options: str) -> Iterator[tuple[Camera, subprocess.Popen[str]]]:
     command = [sys.executable, str(SENDER), *SIZE, *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        one = Camera(f"tcp://127.0.0.1:{int(process.stdout.readline())}", time.perf_counter_ns, 0.5)
+        live_camera = Camera(f"tcp://127.0.0.1:{int(process.stdout.readline())}", time.perf_counter_ns, 0.5)
         try:
-            yield one, process
+            yield live_camera, process
         finally:
-            one.close()
+            live_camera.close()
             process.kill()
 
 
 @contextmanager
 def camera(*options: str) -> Iterator[Camera]:
-    with sending(*options) as (one, _):
-        yield one
+    with sending(*options) as (live_camera, _):
+        yield live_camera
 
 
 @pytest.mark.nightly
 def test_a_camera_shows_the_frame_that_was_ready_at_a_moment_and_its_age() -> None:
-    with camera("--seconds", "4", "--age-ms", "80") as one:
+    with camera("--seconds", "4", "--age-ms", "80") as live_camera:
         time.sleep(1.0)
         now_ns = time.perf_counter_ns()
-        newest, earlier = one.frame_at(now_ns), one.frame_at(now_ns - 200_000_000)
+        newest, earlier = live_camera.frame_at(now_ns), live_camera.frame_at(now_ns - 200_000_000)
         assert newest is not None
         assert earlier is not None
         assert 0 <= now_ns - newest.due_ns < 3e9 * PERIOD_S
@@ -65,41 +65,41 @@ def test_a_camera_shows_the_frame_that_was_ready_at_a_moment_and_its_age() -> No
 
 
 def test_the_age_of_frames_is_unknown_where_time_stamps_are_on_no_clock() -> None:
-    with camera("--seconds", "3", "--relative") as one:
-        assert one.newest.age_ns is None
+    with camera("--seconds", "3", "--relative") as live_camera:
+        assert live_camera.newest.age_ns is None
 
 
 @pytest.mark.nightly
 @pytest.mark.flaky(reruns=4)  # on a busy machine the sender itself may be late by a frame, and stamps say so
 def test_frames_that_were_lost_on_the_way_have_numbers() -> None:
-    with camera("--seconds", "4", "--lose", "5") as one:
+    with camera("--seconds", "4", "--lose", "5") as live_camera:
         time.sleep(1.5)
-        with one._changed:
-            held = list(one._frames)
+        with live_camera._changed:
+            held = list(live_camera._frames)
     steps = {later.number - earlier.number for earlier, later in pairwise(held)}
     assert steps == {1, 2}
-    shown = [number_in(pixels_of(frame)) for frame in held]
-    assert [b - a for a, b in pairwise(shown)] == [later.number - earlier.number for earlier, later in pairwise(held)]
+    numbers = [number_in(pixels_of(frame)) for frame in held]
+    assert [b - a for a, b in pairwise(numbers)] == [later.number - earlier.number for earlier, later in pairwise(held)]
 
 
 @pytest.mark.nightly
-def test_a_camera_that_stops_is_said_in_one_line_that_does_not_name_it() -> None:
-    with camera("--seconds", "2") as one:
-        one.thread.join(10)
+def test_a_stopped_camera_is_reported_in_one_line_without_its_name() -> None:
+    with camera("--seconds", "2") as live_camera:
+        live_camera.thread.join(10)
         with pytest.raises(VideoError, match=r"stopped \(it ended\): check the camera and the files") as refused:
-            one.frame_at(time.perf_counter_ns())
-        assert one.source not in str(refused.value)  # the operator and the journal's readers are blind
+            live_camera.frame_at(time.perf_counter_ns())
+        assert live_camera.source not in str(refused.value)  # the operator and the journal's readers are blind
 
 
 @pytest.mark.nightly
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="this system cannot stop a process")
-def test_a_camera_that_sends_nothing_without_closing_is_said_in_words() -> None:
-    with sending("--seconds", "20") as (one, process):
+def test_a_silent_camera_is_reported() -> None:
+    with sending("--seconds", "20") as (live_camera, process):
         os.kill(process.pid, signal.SIGSTOP)
-        one.thread.join(10)
-        assert not one.thread.is_alive()
+        live_camera.thread.join(10)
+        assert not live_camera.thread.is_alive()
         with pytest.raises(VideoError, match=r"stopped \(no data arrived in time\)"):
-            one.frame_at(time.perf_counter_ns())
+            live_camera.frame_at(time.perf_counter_ns())
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_another_program_in_place_of_a_camera_is_one_line_in_time(
 
     said = ends_with_each(client)
     line = rf"the camera {protocol}://127.0.0.1:\d+/? cannot be used: [^\n]{{1,100}}$"
-    assert [one for one in said.items() if not re.match(line, one[1])] == []
+    assert [reply for reply in said.items() if not re.match(line, reply[1])] == []
 
 
 def test_numbers_follow_time_stamps() -> None:

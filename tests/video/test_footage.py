@@ -32,18 +32,18 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def footage(clip: Path) -> Iterator[Footage]:
-    one = Footage(clip)
-    yield one
-    one.close()
-    assert not one.thread.is_alive()
+    opened_footage = Footage(clip)
+    yield opened_footage
+    opened_footage.close()
+    assert not opened_footage.thread.is_alive()
 
 
 def pixels_of(frame: Any) -> Any:
     return np.frombuffer(frame.pixels, np.uint8).reshape(frame.height, frame.stride)[:, : 4 * frame.width]
 
 
-def shown(footage: Footage, moment_ns: int, number: int | None = None) -> Any:
-    """Return the frame of a moment, once it, or the one of a number, is decoded."""
+def decoded_frame(footage: Footage, moment_ns: int, number: int | None = None) -> Any:
+    """Return the frame of a moment once it is decoded; with ``number``, wait for that frame."""
     until = time.perf_counter() + 10
     while time.perf_counter() < until:
         frame = footage.frame_at(moment_ns)
@@ -55,23 +55,23 @@ def shown(footage: Footage, moment_ns: int, number: int | None = None) -> Any:
 
 def test_footage_runs_from_the_beginning_of_the_trial_and_again(footage: Footage) -> None:
     footage.rewind()
-    first = shown(footage, 5_000)
+    first = decoded_frame(footage, 5_000)
     assert (first.number, number_in(pixels_of(first)), first.age_ns) == (0, 0, 0)
-    assert shown(footage, 900_000_000_000).number == 0  # it stands until the trial begins
+    assert decoded_frame(footage, 900_000_000_000).number == 0  # it stands until the trial begins
     footage.begin(1_000)
     for number in range(2 * FRAMES + 3):
-        frame = shown(footage, 1_000 + number * PERIOD_NS + PERIOD_NS // 2, number)
+        frame = decoded_frame(footage, 1_000 + number * PERIOD_NS + PERIOD_NS // 2, number)
         assert number_in(pixels_of(frame)) == number % FRAMES
         assert abs(frame.due_ns - (1_000 + number * PERIOD_NS)) < 1_000_000
 
 
 def test_a_rewound_footage_shows_its_first_frame_before_anything_is_decoded_again(footage: Footage) -> None:
     footage.begin(0)
-    shown(footage, 5 * PERIOD_NS + 1_000_000, 5)
+    decoded_frame(footage, 5 * PERIOD_NS + 1_000_000, 5)
     with footage._changed:  # the decoder waits for this lock
         footage.rewind()
         first = footage.frame_at(7 * PERIOD_NS)
-    for frame in (first, shown(footage, 7 * PERIOD_NS)):
+    for frame in (first, decoded_frame(footage, 7 * PERIOD_NS)):
         assert frame is not None
         assert (frame.number, number_in(pixels_of(frame))) == (0, 0)
 
@@ -79,7 +79,7 @@ def test_a_rewound_footage_shows_its_first_frame_before_anything_is_decoded_agai
 def test_frames_that_are_overdue_are_skipped_and_keep_their_numbers(footage: Footage) -> None:
     footage.rewind()
     footage.begin(0)
-    later = shown(footage, 200 * PERIOD_NS + 1_000_000, 200)
+    later = decoded_frame(footage, 200 * PERIOD_NS + 1_000_000, 200)
     assert number_in(pixels_of(later)) == 200 % FRAMES
 
 
@@ -87,7 +87,7 @@ def test_frames_are_scaled_to_the_tank_with_their_own_ratio(footage: Footage) ->
     footage.fit(640, 200)
     footage.rewind()
     footage.begin(0)
-    frame = shown(footage, 20 * PERIOD_NS + 1_000_000, 20)
+    frame = decoded_frame(footage, 20 * PERIOD_NS + 1_000_000, 20)
     assert frame.height == 200
     assert abs(frame.width / frame.height - SIZE[0] / SIZE[1]) < 0.01
     assert number_in(pixels_of(frame)) == 20 % FRAMES
@@ -134,7 +134,7 @@ def test_a_file_that_fails_later_stops_without_its_name(clip: Path, monkeypatch:
     assert clip.name not in str(refused.value)
 
 
-def test_an_error_of_ffmpeg_that_is_no_system_error_stops_it_too(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_ffmpeg_error_that_is_not_a_system_error_stops_it_too(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from av.error import ExternalError
 
     footage = Footage(clip)
@@ -170,7 +170,7 @@ def unreadable_name(clip: bytes) -> bytes:
         lambda _clip: b"#EXTM3U\n#EXTINF:1,\nclip.mp4\n",
     ],
 )
-def test_a_file_that_is_no_video_is_refused_in_one_line(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
+def test_an_invalid_video_file_is_refused_in_one_line(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
     write_clip(tmp_path / "clip.mp4", frames=6, size=(64, 48))
     broken = tmp_path / "broken.mp4"
     broken.write_bytes(damage((tmp_path / "clip.mp4").read_bytes()))

@@ -1,4 +1,4 @@
-"""The videos of a study: closed for good, and described without what would let a stranger in."""
+"""The videos of a study: closed completely, and described without login data."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from tests.video.clips import write_clip
 
 
 class FakeCamera:
-    """A camera that opens once the test lets it."""
+    """A camera that opens on a signal of the test."""
 
     opens: threading.Event
-    made: list[FakeCamera]
+    opened_cameras: list[FakeCamera]
     fault = ""
 
     def __init__(self, source: str, _now_ns: Any, holds_s: float) -> None:
         if self.fault:
             raise VideoError(f"the camera {source} cannot be used: {self.fault}")
-        self.made.append(self)
+        self.opened_cameras.append(self)
         self.works = True
         assert self.opens.wait(10)
         self.source, self.size, self.closed, self.held_s = source, (640, 480), False, holds_s
@@ -58,7 +58,7 @@ class FakeCamera:
 @pytest.fixture
 def camera(monkeypatch: pytest.MonkeyPatch) -> type[FakeCamera]:
     monkeypatch.setattr(FakeCamera, "opens", threading.Event(), raising=False)
-    monkeypatch.setattr(FakeCamera, "made", [], raising=False)
+    monkeypatch.setattr(FakeCamera, "opened_cameras", [], raising=False)
     monkeypatch.setattr(FakeCamera, "fault", "")
     monkeypatch.setattr(sources, "Camera", FakeCamera)
     return FakeCamera
@@ -118,8 +118,8 @@ def test_a_camera_that_opens_after_all_were_closed_is_closed_too(study: Protocol
     every.close()  # does not wait for the camera
     camera.opens.set()
     opening.join(10)
-    (made,) = camera.made
-    assert made.closed
+    (opened_camera,) = camera.opened_cameras
+    assert opened_camera.closed
 
 
 def test_a_camera_is_described_by_its_size_rate_and_age(study: Protocol, camera: type[FakeCamera]) -> None:
@@ -129,42 +129,46 @@ def test_a_camera_is_described_by_its_size_rate_and_age(study: Protocol, camera:
     assert every.open().about == "camera, 640 × 480, 30 Hz, age unknown"
     described = {"source": "v4l2:/dev/video3", "size": [640, 480], "rate_hz": 30.0, "age": "unknown"}
     assert every.describe() == {"camera": described}
-    (opened,) = camera.made
-    assert every.source("camera") is opened
-    opened.newest = replace(opened.newest, age_ns=12_400_000, period_ns=16_000_000)
+    (opened_camera,) = camera.opened_cameras
+    assert every.source("camera") is opened_camera
+    opened_camera.newest = replace(opened_camera.newest, age_ns=12_400_000, period_ns=16_000_000)
     assert every.open().about == "camera, 640 × 480, 62.5 Hz, 12 ms old"
     assert every.describe() == {"camera": described | {"rate_hz": 62.5, "age": "from the source's time stamps"}}
     every.fit(1152, 648)
-    assert opened.fitted == (1152, 648)
+    assert opened_camera.fitted == (1152, 648)
 
 
 def test_a_camera_holds_frames_for_the_longest_delay_of_a_condition_that_shows_it(camera: type[FakeCamera]) -> None:
     camera.opens.set()
 
     def held_s(*delays_ms: float, varied: str = "force_delay_ms") -> float:
-        shown = [SimpleNamespace(shows_video=True, view="camera", footage_sha256="", delay_ms=ms) for ms in delays_ms]
+        conditions_shown = [
+            SimpleNamespace(shows_video=True, view="camera", footage_sha256="", delay_ms=ms) for ms in delays_ms
+        ]
         drawn = SimpleNamespace(shows_video=False, view="drawn", footage_sha256="", delay_ms=900.0)
         study: Any = SimpleNamespace(
-            conditions=dict(enumerate([*shown, drawn])), stimuli={"delays": SimpleNamespace(vary=varied)}
+            conditions=dict(enumerate([*conditions_shown, drawn])), stimuli={"delays": SimpleNamespace(vary=varied)}
         )
         every = videos(study, "")
         assert every.views == ("camera",)
         every.open()
-        assert camera.made[-1].source == sources.USUAL
-        return camera.made[-1].held_s
+        assert camera.opened_cameras[-1].source == sources.USUAL
+        return camera.opened_cameras[-1].held_s
 
     assert [held_s(250, 137.5), held_s(137.5, 250), held_s(0)] == [0.25, 0.25, 0.0]
     assert held_s(250, varied="delay_ms") == MOST_DELAY_MS / 1000
 
 
-def test_a_computer_without_a_camera_is_told_and_footage_that_is_missing_is_an_error(
+def test_a_missing_camera_is_reported_and_missing_footage_is_an_error(
     study: Protocol, camera: type[FakeCamera], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sources, "is_installed", lambda: True)
     camera.opens.set()
     nowhere = Path("/nowhere")
     assert missing_on_computer(study, nowhere, "v4l2:/dev/video3", lambda: 0) == ""
-    assert [(made.source, made.held_s, made.closed) for made in camera.made] == [("v4l2:/dev/video3", 0.0, True)]
+    assert [
+        (opened_camera.source, opened_camera.held_s, opened_camera.closed) for opened_camera in camera.opened_cameras
+    ] == [("v4l2:/dev/video3", 0.0, True)]
     camera.fault = "no such device"
     assert missing_on_computer(study, nowhere, "dshow:video=A", lambda: 0) == (
         "the camera dshow:video=A cannot be used: no such device"
@@ -183,11 +187,11 @@ def test_the_receipt_has_neither_name_nor_password_of_a_camera(study: Protocol, 
     assert every.open().fault == ""
     assert every.describe()["camera"]["source"] == "rtsp://192.168.0.7:554"
     every.close()
-    assert camera.made[0].closed
+    assert camera.opened_cameras[0].closed
 
 
 @pytest.mark.parametrize(
-    ("source", "shown"),
+    ("source", "public_address"),
     [
         ("rtsp://operator:secret@camera.example/live", "rtsp://camera.example"),
         ("rtsp://operator:se@cret@camera.example:554/live", "rtsp://camera.example:554"),
@@ -222,15 +226,15 @@ def test_the_receipt_has_neither_name_nor_password_of_a_camera(study: Protocol, 
         ),
     ],
 )
-def test_of_an_address_scheme_and_host_alone_are_shown(source: str, shown: str) -> None:
-    assert without_login(source) == shown
+def test_only_scheme_and_host_of_an_address_are_shown(source: str, public_address: str) -> None:
+    assert without_login(source) == public_address
 
 
 @pytest.mark.parametrize(
     ("installed", "words"),
     [(True, "Note: the camera tcp://127.0.0.1:9 cannot be used: "), (False, "pip install 'liquid-study[video]'")],
 )
-def test_check_notes_what_keeps_this_machine_from_showing_the_camera(
+def test_check_notes_why_this_machine_cannot_show_the_camera(
     camera_study: Path, installed: bool, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
 
@@ -248,11 +252,11 @@ def test_a_video_that_failed_is_opened_again_without_its_name(study: Protocol, c
     every = videos(study)
     every.open()
     every.reopen()
-    assert len(camera.made) == 1
-    camera.made[0].works = False
+    assert len(camera.opened_cameras) == 1
+    camera.opened_cameras[0].works = False
     every.reopen()
-    assert [one.closed for one in camera.made] == [True, False]
-    camera.made[1].works = False
+    assert [opened_camera.closed for opened_camera in camera.opened_cameras] == [True, False]
+    camera.opened_cameras[1].works = False
     camera.fault = "no such device"
     with pytest.raises(
         VideoError,
@@ -279,7 +283,7 @@ def test_footage_that_was_replaced_is_refused(tmp_path: Path) -> None:
     assert again.open().fault == f"{clip} has changed since the study began: restore the original file"
 
 
-def test_the_row_of_a_trial_counts_frames_that_were_late_or_lost_and_says_their_age() -> None:
+def test_the_row_of_a_trial_counts_late_and_lost_frames_and_states_their_age() -> None:
     def frame(number: int, age_ms: float | None) -> VideoFrame:
         age_ns = None if age_ms is None else round(1e6 * age_ms)
         return VideoFrame(
@@ -314,8 +318,8 @@ def test_a_video_that_stops_can_be_reconnected() -> None:
 
 def test_frames_are_counted_by_the_median_of_ten_gaps_once_there_are_ten() -> None:
     numbers = sources._FrameNumbers(100_000_000)
-    counted = [numbers.next_number(0.02 * place) for place in range(10)]
-    assert (counted, numbers.period_ns) == ([*range(10)], 100_000_000)
+    frame_numbers = [numbers.next_number(0.02 * place) for place in range(10)]
+    assert (frame_numbers, numbers.period_ns) == ([*range(10)], 100_000_000)
     assert [numbers.next_number(stamp_s) for stamp_s in (0.20, 0.26, 0.25, 0.27)] == [10, 13, 14, 15]
     assert numbers.period_ns == 20_000_000
 
@@ -350,7 +354,7 @@ def test_the_age_of_a_frame_is_by_the_clock_that_its_stamp_is_from(
     assert sources._age_ns(stamp_s) == age_ns
 
 
-def test_a_camera_shows_the_newest_frame_that_was_ready_and_says_what_ended_it() -> None:
+def test_a_camera_shows_the_newest_ready_frame_and_states_why_it_ended() -> None:
     camera = Camera.__new__(Camera)
     now_ns = [40]
     camera._now_ns, camera._changed, camera._failure = lambda: now_ns[0], threading.Condition(), ""
@@ -358,8 +362,8 @@ def test_a_camera_shows_the_newest_frame_that_was_ready_and_says_what_ended_it()
         VideoFrame(number=due_ns, width=2, height=2, stride=8, pixels=b"", due_ns=due_ns, age_ns=None, period_ns=10)
         for due_ns in (10, 20, 30)
     )
-    shown = [camera.frame_at(moment_ns) for moment_ns in (9, 10, 29, 30, 99)]
-    assert [one and one.due_ns for one in shown] == [None, 10, 20, 30, 30]
+    frames = [camera.frame_at(moment_ns) for moment_ns in (9, 10, 29, 30, 99)]
+    assert [frame and frame.due_ns for frame in frames] == [None, 10, 20, 30, 30]
     now_ns[0] = 30 + round(sources.STALLS_S * 1e9)
     assert camera.frame_at(30) is not None
     now_ns[0] += 1

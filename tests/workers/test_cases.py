@@ -41,23 +41,23 @@ def test_cases_are_computed_by_so_many_processes_or_by_the_cluster(
         (None, "the process ended with exit code None; the terminal may show why"),
     ],
 )
-def test_a_process_that_ended_is_told_with_its_signal_or_code(code: int | None, sentence: str) -> None:
+def test_an_ended_process_is_reported_with_its_signal_or_exit_code(code: int | None, sentence: str) -> None:
     assert Crashed(code).sentence == sentence
 
 
 def test_a_worker_computes_only_with_the_versions_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = {"Python": "3.11.7", "numpy": "2.1.0", "scipy": "1.14"}
-    monkeypatch.setattr(cases, "environment", lambda: found)
+    versions = {"Python": "3.11.7", "numpy": "2.1.0", "scipy": "1.14"}
+    monkeypatch.setattr(cases, "environment", lambda: versions)
     monkeypatch.setattr("socket.gethostname", lambda: "lab1")
-    divided = cases._compute(dict(found), divmod, (17, 5), {})
+    divided = cases._compute(dict(versions), divmod, (17, 5), {})
     assert divided == (3, 2)
-    assert cases._compute(dict(found), int, ("ff",), {"base": 16}) == 255
+    assert cases._compute(dict(versions), int, ("ff",), {"base": 16}) == 255
     expected = {"Python": "3.12.1", "numpy": "2.1.0", "numba": "0.60"}
-    with pytest.raises(WorkerError) as refused:
+    with pytest.raises(WorkerError) as error:
         cases._compute(expected, divmod, (17, 5), {})
-    assert str(refused.value) == (
+    assert str(error.value) == (
         "the worker on lab1 has Python 3.11.7 instead of 3.12.1; numba missing instead of 0.60; scipy 1.14 instead of "
-        "missing: install the same versions on every worker, because results could differ"
+        "missing: install the same versions on every worker, because results could otherwise differ"
     )
 
 
@@ -77,27 +77,27 @@ def test_a_scheduler_is_greeted_at_its_host_and_port(
             return self
 
         def __exit__(self, *_: object) -> None:
-            asked.append("closed")
+            addresses.append("closed")
 
-    asked: list[Any] = []
+    addresses: list[Any] = []
     monkeypatch.setattr(
-        "socket.create_connection", lambda place, timeout: asked.append((place, timeout)) or Connection()
+        "socket.create_connection", lambda place, timeout: addresses.append((place, timeout)) or Connection()
     )
-    monkeypatch.setattr(cases, "_receive_greeting", lambda connection: asked.append(type(connection).__name__))
+    monkeypatch.setattr(cases, "_receive_greeting", lambda connection: addresses.append(type(connection).__name__))
     cases._check_responds(address)
-    assert asked == [(target, 10.0), *["Connection"] * greets, "closed"]
+    assert addresses == [(target, 10.0), *["Connection"] * greets, "closed"]
 
 
 @pytest.mark.parametrize("address", ["lab1:8786", "http://lab1:8786", "tcp://lab1", "tcp://lab 1:8786", "tcp://:1", ""])
-def test_what_is_no_address_is_refused_with_an_example(address: str) -> None:
-    with pytest.raises(WorkerError) as refused:
+def test_an_invalid_address_is_refused_with_an_example(address: str) -> None:
+    with pytest.raises(WorkerError) as error:
         cases._check_responds(address)
-    assert str(refused.value) == (
+    assert str(error.value) == (
         f"{address!r} is not the address of a Dask scheduler: specify tcp://HOST:PORT, such as tcp://lab1:8786"
     )
 
 
-def test_a_scheduler_that_is_not_there_is_told_with_address_and_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unreachable_scheduler_is_reported_with_address_and_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise ConnectionRefusedError(111, "Connection refused")
 
@@ -107,7 +107,7 @@ def test_a_scheduler_that_is_not_there_is_told_with_address_and_reason(monkeypat
 
 
 class Pieces:
-    """A connection that sends these pieces, each at most as long as was asked for."""
+    """A connection that sends these pieces, each cut to the requested length."""
 
     def __init__(self, *pieces: bytes) -> None:
         self.pieces = list(pieces)
@@ -155,7 +155,7 @@ class KilledWorker(Exception):
         (None, None),
     ],
 )
-def test_an_error_of_the_cluster_is_told_and_one_of_a_case_is_not_changed(
+def test_cluster_errors_are_reported_and_errors_of_a_case_are_raised_unchanged(
     error: Exception | None, sentence: str | None
 ) -> None:
     ended: list[Any] = []
@@ -164,7 +164,7 @@ def test_an_error_of_the_cluster_is_told_and_one_of_a_case_is_not_changed(
     if sentence is None:
         ClusterExecutor.__exit__(executor, kind, error, None)
     else:
-        with pytest.raises(WorkerError) as told:
+        with pytest.raises(WorkerError) as refusal:
             ClusterExecutor.__exit__(executor, kind, error, None)
-        assert (str(told.value), told.value.__cause__) == (sentence, error)
+        assert (str(refusal.value), refusal.value.__cause__) == (sentence, error)
     assert ended == [{"cancel_futures": error is not None}]

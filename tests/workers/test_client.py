@@ -27,7 +27,7 @@ SOON_S = 60.0
 
 
 def carry_out(order: str, send: Send, stop: Stop) -> object:
-    """Do what an order says."""
+    """Carry out a test order."""
     send(f"{order} begun")
     match order:
         case "refuse":
@@ -54,43 +54,43 @@ def carry_out(order: str, send: Send, stop: Stop) -> object:
 
 
 class Tried(WorkerClient[str, Any]):
-    """A client that keeps what was answered."""
+    """A client that keeps all answers."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("tests.workers.test_client:carry_out", name="tried", **options)
         self.kept: list[tuple[int, Any]] = []
 
     def answers(self, wait_s: float = 0.0) -> list[tuple[int, Any]]:
-        found = super().answers(wait_s)
-        self.kept += found
-        return found
+        new_answers = super().answers(wait_s)
+        self.kept += new_answers
+        return new_answers
 
 
 @pytest.fixture
 def start() -> Iterator[Callable[..., Tried]]:
-    """Return what starts a worker; each is closed, and none is left."""
-    started: list[Tried] = []
+    """Return a function that starts a worker; close all workers and check that their processes end."""
+    workers_started: list[Tried] = []
 
     def made(**options: Any) -> Tried:
-        started.append(Tried(**options))
-        return started[-1]
+        workers_started.append(Tried(**options))
+        return workers_started[-1]
 
     yield made
-    for one in started:
-        one.close()
-        one.wait_until_ended()
-        assert one.ended
+    for worker in workers_started:
+        worker.close()
+        worker.wait_until_ended()
+        assert worker.ended
     assert not [child for child in multiprocessing.active_children() if child.name == "tried"]
 
 
 def answers_until(worker: Tried, number: int, wanted: Callable[[Any], bool]) -> list[Any]:
-    """Return the answers to an order until one is ``wanted``."""
+    """Return the answers to an order up to the first ``wanted`` one."""
     end_s = time.perf_counter() + SOON_S
     while True:
-        found = [answer for of_number, answer in worker.kept if of_number == number]
-        if found and wanted(found[-1]):
-            return found
-        assert time.perf_counter() < end_s, found
+        answers = [answer for of_number, answer in worker.kept if of_number == number]
+        if answers and wanted(answers[-1]):
+            return answers
+        assert time.perf_counter() < end_s, answers
         worker.answers(wait_s=0.1)
 
 
@@ -101,13 +101,13 @@ def is_last(answer: Any) -> bool:
 @pytest.mark.slow
 def test_orders_are_carried_out_one_after_the_other_and_a_refusal_is_a_sentence(start: Callable[..., Tried]) -> None:
     worker = start()
-    first, refused, last = (worker.order(order) for order in ("first", "refuse", "last"))
+    first, refused_order, last = (worker.order(order) for order in ("first", "refuse", "last"))
     answers_until(worker, last, is_last)
     assert worker.kept == [
         (first, "first begun"),
         (first, "first"),
-        (refused, "refuse begun"),
-        (refused, Refused("it cannot be done")),
+        (refused_order, "refuse begun"),
+        (refused_order, Refused("it cannot be done")),
         (last, "last begun"),
         (last, "last"),
     ]
@@ -115,15 +115,15 @@ def test_orders_are_carried_out_one_after_the_other_and_a_refusal_is_a_sentence(
 
 
 @pytest.mark.slow
-def test_a_plug_in_that_fails_is_named_and_the_worker_goes_on(
+def test_a_failing_plug_in_is_named_and_the_worker_continues(
     start: Callable[..., Tried], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     install(tmp_path, "toy-plug", "method", {"toy": "toy_plug:fail"}, toy_plug="def fail():\n    return 1 / 0\n")
     monkeypatch.syspath_prepend(tmp_path)
     worker = start()
-    (*_, refused) = answers_until(worker, worker.order("plug-in"), is_last)
-    assert isinstance(refused, Refused)
-    assert refused.sentence.startswith("the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero)")
+    (*_, last_answer) = answers_until(worker, worker.order("plug-in"), is_last)
+    assert isinstance(last_answer, Refused)
+    assert last_answer.sentence.startswith("the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero)")
     assert worker.works
 
 
@@ -173,7 +173,9 @@ def test_a_process_that_does_not_listen_is_killed(start: Callable[..., Tried], m
     assert worker.answers() == []
 
 
-def test_a_process_loads_what_its_task_loads_and_may_have_the_lowest_priority(start: Callable[..., Tried]) -> None:
+def test_a_process_loads_only_the_modules_of_its_task_and_may_have_the_lowest_priority(
+    start: Callable[..., Tried],
+) -> None:
     worker = start(background=True)
     assert answers_until(worker, worker.order("loaded"), is_last)[-1] == []
     if sys.platform != "win32":

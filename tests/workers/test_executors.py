@@ -18,7 +18,7 @@ import pytest
 from study_app.errors import PlugInError, Problem, ProtocolError, StudyError, WorkerError
 from study_app.workers.executors import Workers, open_executor
 from study_app.workers.server import CONTEXT
-from tests.plug_in_packages import forget, install
+from tests.plug_in_packages import forget_plug_ins, install
 from tests.workers.worker_cases import die, draw, loaded, refuse, refuse_file
 
 pytestmark = pytest.mark.slow
@@ -42,9 +42,9 @@ def test_results_are_those_of_the_seeds_in_their_order_and_an_error_is_that_of_i
         with pytest.raises(StudyError, match="case 3"):
             futures[3].result()
         assert [future.result() for future in futures[:3]] == [0, 1, 2]
-        with pytest.raises(ProtocolError, match=r"a\.toml: 1 problem\n  line 7: blocks\.b: is unknown") as refused:
+        with pytest.raises(ProtocolError, match=r"a\.toml: 1 problem\n  line 7: blocks\.b: is unknown") as error:
             executor.submit(refuse_file, 7).result()
-        assert refused.value.problems == (Problem("blocks.b", "is unknown", 7, hint="did you mean c?"),)
+        assert error.value.problems == (Problem("blocks.b", "is unknown", 7, hint="did you mean c?"),)
         assert executor.submit(draw, 1).result() == draw(1)
     with pytest.raises(Exception if workers.cluster else RuntimeError, match=r"shutdown|Client is closed"):
         executor.submit(draw, 1)
@@ -59,11 +59,11 @@ def test_a_process_loads_no_window_library_and_computes_in_one_thread(monkeypatc
 @posix
 def test_a_case_that_kills_its_process_is_one_clear_line() -> None:
     with (
-        pytest.raises(WorkerError, match="a worker process ended unexpectedly") as raised,
+        pytest.raises(WorkerError, match="a worker process ended unexpectedly") as error,
         open_executor(Workers(2)) as executor,
     ):
         list(executor.map(die, range(4)))
-    assert "\n" not in str(raised.value)
+    assert "\n" not in str(error.value)
 
 
 def test_a_plug_in_that_fails_in_a_case_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,7 +72,7 @@ def test_a_plug_in_that_fails_in_a_case_is_named(tmp_path: Path, monkeypatch: py
     fail = resolve_name("toy_plug:fail")
     with pytest.raises(PlugInError, match=r"toy-plug 1\.0 failed \(ZeroDivisionError"), open_executor() as executor:
         executor.submit(fail).result()
-    forget("toy_plug")
+    forget_plug_ins("toy_plug")
 
 
 @posix
@@ -122,7 +122,7 @@ ENDLESS = """
 @posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL], ids=["interrupted", "killed"])
 def test_processes_end_with_their_program_and_print_no_traceback(number: int) -> None:
-    """Ctrl+C reaches every process of the terminal; a kill reaches the program alone."""
+    """Ctrl+C reaches every process of the terminal; a kill reaches only the program."""
     program = subprocess.Popen(
         [sys.executable, "-c", textwrap.dedent(ENDLESS)],
         stdout=subprocess.PIPE,

@@ -23,16 +23,18 @@ def test_two_processes_share_the_tasks_and_results_keep_their_order(without_othe
         time.sleep(0.05)
         return number, os.getpid(), b"\x89PNG" * 100_000
 
-    told: list[tuple[int, int, bytes]] = []
-    results = SharedTasks([lambda number=number: compute(number) for number in range(12)]).results(told.append)
+    progress_calls: list[tuple[int, int, bytes]] = []
+    results = SharedTasks([lambda number=number: compute(number) for number in range(12)]).results(
+        progress_calls.append
+    )
     assert [number for number, _, _ in results] == list(range(12))
     assert len({process for _, process, _ in results}) == 2
-    assert {process for _, process, _ in told} == {os.getpid()}
-    assert [number for number, _, _ in told] == list(range(len(told)))
+    assert {process for _, process, _ in progress_calls} == {os.getpid()}
+    assert [number for number, _, _ in progress_calls] == list(range(len(progress_calls)))
 
 
 @only_linux
-def test_what_a_dying_process_leaves_is_computed_here(without_other_threads: None, tmp_path: Path) -> None:
+def test_unfinished_tasks_of_a_dying_process_are_computed_here(without_other_threads: None, tmp_path: Path) -> None:
     here, died = os.getpid(), tmp_path / "died"
 
     def compute(number: int) -> int:

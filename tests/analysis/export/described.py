@@ -7,10 +7,13 @@ from pathlib import Path
 
 def undescribed(folder: Path) -> set[str]:
     """Return the columns of the dataset's tables without a description, and descriptions without a column."""
-    described = {
-        it["name"] for it in json.loads((folder / "dataset_description.json").read_bytes())["variableMeasured"]
+    variables = {
+        variable["name"]
+        for variable in json.loads((folder / "dataset_description.json").read_bytes())["variableMeasured"]
     }
     tables = list((folder / "data").rglob("*_data.csv"))
     assert tables
-    held = {name for path in tables for name in next(csv.reader([path.read_text(encoding="utf-8").split("\n")[0]]))}
-    return described ^ held
+    column_names = {
+        name for path in tables for name in next(csv.reader([path.read_text(encoding="utf-8").split("\n")[0]]))
+    }
+    return variables ^ column_names

@@ -35,21 +35,23 @@ def to(tmp_path: Path) -> Path:
     return tmp_path / "deep" / "out"
 
 
-def test_what_earlier_versions_wrote_in_clear_is_not_handed_out_sealed(rek: Results, to: Path) -> None:
-    """Their tables have the columns that tell a condition: files that are handed out have them after unblinding."""
+def test_columns_that_earlier_versions_wrote_in_clear_are_not_exported_before_unblinding(
+    rek: Results, to: Path
+) -> None:
+    """Their tables contain columns that reveal conditions; exported files contain these only after unblinding."""
     rek.add("P001", lambda *_: 6, changes={"force_mean_n": 4.8151623})
     export(rek.folder, to, extras=("psych-ds", "wide"))
-    held = {path: path.read_bytes() for path in to.rglob("*") if path.is_file()}
-    assert not [path for path, content in held.items() if b"4.8151623" in content]
+    contents = {path: path.read_bytes() for path in to.rglob("*") if path.is_file()}
+    assert not [path for path, content in contents.items() if b"4.8151623" in content]
     assert set(json.loads((to / "codebook.json").read_text("utf-8"))["sealed_columns"]) == SEALED
-    described = json.loads((to / "psych-ds" / "dataset_description.json").read_text("utf-8"))["variableMeasured"]
-    assert not SEALED & {one["name"] for one in described}
+    variables = json.loads((to / "psych-ds" / "dataset_description.json").read_text("utf-8"))["variableMeasured"]
+    assert not SEALED & {variable["name"] for variable in variables}
     rek.open()
     export(rek.folder, to)
     assert {row["force_mean_n"] for row in rows(to, "trials")} == {"4.8151623"}
 
 
-def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Results, to: Path) -> None:
+def test_excluded_sessions_and_trials_are_exported_with_their_reason_and_not_counted(rek: Results, to: Path) -> None:
     for participant in ("P001", "P002", "P003"):
         rek.add(participant, lambda *_: 6)
     trial = rek.trial("P002", "honey")
@@ -57,9 +59,9 @@ def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Resul
     rek.exclude("P002", trial=trial, reason="spilled tea")
     export(rek.folder, to)
     for name in ("responses", "trials"):
-        found = rows(to, name)
-        assert {row["participant"] for row in found} == {"P001", "P002", "P003"}
-        for row in found:
+        exported_rows = rows(to, name)
+        assert {row["participant"] for row in exported_rows} == {"P001", "P002", "P003"}
+        for row in exported_rows:
             excluded = row["participant"] == "P001" or (row["participant"], row["trial"]) == ("P002", str(trial))
             reason = {"P001": 'the phone rang, "twice"\nand 🌊', "P002": "spilled tea"}.get(row["participant"], "")
             assert (row["excluded"], row["exclusion_reason"]) == (("true", reason) if excluded else ("false", "n/a"))
@@ -85,28 +87,34 @@ def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Resul
     rek.open()
     export(rek.folder, to)
     blocks = json.loads((to / "codebook.json").read_text("utf-8"))["blocks"]
-    names = {one["condition"]: (one["liquid"], one["delay_ms"], one["code"]) for it in blocks for one in it["settings"]}
+    names = {
+        setting["condition"]: (setting["liquid"], setting["delay_ms"], setting["code"])
+        for block_table in blocks
+        for setting in block_table["settings"]
+    }
     assert names["delay_50"] == ("water", 50, rek.code("delay_50", "delays"))
     assert names["honey"] == ("honey", 0, honey)
 
 
 def test_the_codebook_counts_answers_that_were_given(small: Results, to: Path) -> None:
-    found = []
+    answer_counts = []
     for participant, answer in (("A", None), ("B", 5)):
         small.add(participant, lambda *_, answer=answer: answer)
         export(small.folder, to)
         (block,) = json.loads((to / "codebook.json").read_text("utf-8"))["blocks"]
-        found.append((block["answers_per_participant_setting_and_item"], block["sessions"]))
-    assert found == [([0, 0], []), ([2, 2], [1])], "each setting is presented twice"
+        answer_counts.append((block["answers_per_participant_setting_and_item"], block["sessions"]))
+    assert answer_counts == [([0, 0], []), ([2, 2], [1])], "each setting is presented twice"
 
 
-def test_a_text_is_no_formula_in_a_spreadsheet_and_a_negative_number_a_number(rek: Results, to: Path) -> None:
+def test_texts_are_guarded_against_spreadsheet_formulas_and_negative_numbers_stay_numbers(
+    rek: Results, to: Path
+) -> None:
     rek.add("P001", lambda *_: 6)
     rek.exclude("P001", reason="=1+1")
     export(rek.folder, to)
-    found = rows(to, "trials")
-    assert {row["exclusion_reason"] for row in found} == {"'=1+1"}
-    assert {unguard_formula(row["exclusion_reason"]) for row in found} == {"=1+1"}
+    trial_rows = rows(to, "trials")
+    assert {row["exclusion_reason"] for row in trial_rows} == {"'=1+1"}
+    assert {unguard_formula(row["exclusion_reason"]) for row in trial_rows} == {"=1+1"}
     frame = pd.DataFrame({"text": ["-1"], "number": [-1.5]})
     columns = (Column("text", "text", ""), Column("number", "number", ""))
     assert table_bytes(ExportTable("numbers", columns, frame)) == b"text,number\n'-1,-1.5\n"
@@ -122,7 +130,7 @@ def test_an_export_replaces_the_one_before_it_and_leaves_other_files(rek: Result
     assert (to / "mine.txt").read_text("utf-8") == "kept"
 
 
-def test_a_broken_folder_leaves_no_export(rek: Results, to: Path) -> None:
+def test_a_damaged_results_folder_is_not_exported(rek: Results, to: Path) -> None:
     rek.add("P001", lambda *_: 6)
     rek.responses("P001").write_text("x", encoding="utf-8", newline="\n")
     with pytest.raises(AnalysisError):

@@ -43,12 +43,12 @@ def cells(path: Path) -> list[dict[str, str]]:
 
 
 def sav(path: Path, *, missing: bool = False) -> tuple[pd.DataFrame, Any]:
-    found: tuple[pd.DataFrame, Any] = pyreadstat.read_sav(str(path), user_missing=missing)
-    return found
+    frame: tuple[pd.DataFrame, Any] = pyreadstat.read_sav(str(path), user_missing=missing)
+    return frame
 
 
 def half_answered(small: Results) -> Results:
-    """Fill the small study with an answer of every kind: given, off the scale, not given, in every setting twice."""
+    """Fill the small study with rated, "cannot judge" and missing answers, two of each in every setting."""
     small.add("A", lambda condition, item: {"smooth": 7, "warm": None}[item], changes={"notes": NOTE})
     small.add("B", lambda condition, item: {"smooth": "cannot judge", "warm": 4}[item], changes={"notes": None})
     small.add("C", lambda condition, item: 3 if condition == "heavyzembla" else 6)
@@ -94,29 +94,29 @@ def test_texts_of_any_script_and_length_survive_in_sav(small: Results, to: Path)
     small.exclude("A", trial=1, reason=long.strip())
     small.exclude("A", trial=2, reason="kürzer")
     export(small.folder, to, extras=["sav"])
-    found, _ = sav(table(to, "small", "responses", "sav"))
-    assert set(found["exclusion_reason"]) == {long.strip(), "kürzer", ""}
-    assert set(found["participant"]) == {"A"}
+    frame, _ = sav(table(to, "small", "responses", "sav"))
+    assert set(frame["exclusion_reason"]) == {long.strip(), "kürzer", ""}
+    assert set(frame["participant"]) == {"A"}
 
 
 def test_a_text_that_sav_cannot_hold_is_cut_at_a_letter(small: Results, to: Path) -> None:
     small.add("A", lambda *_: 5)
     small.exclude("A", reason="é" * 20_000)
     export(small.folder, to, extras=["sav"])
-    found, _ = sav(table(to, "small", "responses", "sav"))
-    (reason,) = set(found["exclusion_reason"])
+    frame, _ = sav(table(to, "small", "responses", "sav"))
+    (reason,) = set(frame["exclusion_reason"])
     assert reason == "é" * 16_382 + "…"
 
 
-def test_the_wide_table_for_spss_tells_why_an_answer_is_missing(small: Results, to: Path) -> None:
+def test_the_wide_table_for_spss_states_why_an_answer_is_missing(small: Results, to: Path) -> None:
     half_answered(small)
     for trial in build_schedule(small.protocol, "C", seed=1).trials:
         if small.key.condition(trial.block, trial.code) == "heavyzembla":
             small.exclude("C", trial=trial.number)
     small.open()
     export(small.folder, to, extras=["sav", "wide"])
-    found, about = sav(table(to, "small", "wide", "sav"), missing=True)
-    cells = found.set_index("participant")[["smooth__heavyzembla", "warm__heavyzembla", "smooth__lightquorn"]]
+    frame, about = sav(table(to, "small", "wide", "sav"), missing=True)
+    cells = frame.set_index("participant")[["smooth__heavyzembla", "warm__heavyzembla", "smooth__lightquorn"]]
     assert cells.to_numpy().tolist() == [[7, 99, 7], [98, 4, 98], [97, 97, 6]]
     words = about.variable_value_labels["smooth__heavyzembla"]
     assert (words[97], words[99]) == ("Excluded", "No answer")
@@ -139,8 +139,8 @@ def test_the_psych_ds_folder_keeps_the_rules(small: Results, to: Path, opened: b
         small.open()
     export(small.folder, to, extras=["psych-ds"])
     assert undescribed(to / FOLDER) == set()
-    described = json.loads((to / FOLDER / "dataset_description.json").read_bytes())
-    assert (described["name"], described["alternateName"]) == ("small", "A small study")
+    variables = json.loads((to / FOLDER / "dataset_description.json").read_bytes())
+    assert (variables["name"], variables["alternateName"]) == ("small", "A small study")
     tables = [path.name for path in (to / FOLDER).rglob("*.csv")]
     assert sorted(set(tables)) == sorted(tables), "no table is there twice"
     responses = to / FOLDER / "data" / table(to, "small", "responses", "csv").name
@@ -148,11 +148,11 @@ def test_the_psych_ds_folder_keeps_the_rules(small: Results, to: Path, opened: b
     assert b"All participants are simulated" in (to / FOLDER / "README.md").read_bytes()
 
 
-def test_nothing_hidden_is_in_any_format_while_the_key_is_sealed(small: Results, to: Path) -> None:
+def test_sealed_values_are_in_no_format_before_unblinding(small: Results, to: Path) -> None:
     half_answered(small)
-    written = export(small.folder, to, extras=ALL)
-    assert len(written) == len(set(written)) == len([path for path in to.rglob("*") if path.is_file()])
-    for path in written:
+    exported_files = export(small.folder, to, extras=ALL)
+    assert len(exported_files) == len(set(exported_files)) == len([path for path in to.rglob("*") if path.is_file()])
+    for path in exported_files:
         content = path.read_bytes().lower()
         if path.suffix == ".parquet":
             content = str(pd.read_parquet(path).to_dict()).lower().encode()
@@ -160,14 +160,14 @@ def test_nothing_hidden_is_in_any_format_while_the_key_is_sealed(small: Results,
             assert word.encode() not in content, path.name
 
 
-def test_a_study_without_anybody_who_counts_is_exported_too(small: Results, to: Path) -> None:
+def test_a_study_without_counted_participants_is_exported(small: Results, to: Path) -> None:
     small.add("A", lambda *_: 5, status="unfinished", trials=2)
     export(small.folder, to, extras=ALL)
     assert cells(table(to, "small", "wide", "csv")) == []
     assert len(sav(table(to, "small", "wide", "sav"))[0]) == 0
 
 
-def test_a_folder_that_cannot_be_written_leaves_nothing_of_any_format(small: Results, to: Path) -> None:
+def test_a_failed_write_leaves_no_file_of_any_format(small: Results, to: Path) -> None:
     half_answered(small)
     to.mkdir()
     (to / FOLDER).write_text("in the way", encoding="utf-8", newline="\n")

@@ -50,7 +50,7 @@ EXCLUDED = {"B": "spilled tea"}
 
 
 def _drawn(column: Column, draw: random.Random) -> Any:
-    """Return a value that the column permits and, if it is not one of a few, no other cell has."""
+    """Return a value that the column permits; unless the column has few values, it is unique in the table."""
     if column.levels:
         return draw.choice(column.levels)[0]
     if column.may_miss and draw.random() < 0.2:
@@ -118,10 +118,10 @@ def _expected(results: Results, rows: dict[str, Rows]) -> dict[str, Rows]:
                     "delay_achieved_ms": None if error_ms is None else round(error_ms + delay_ms, 6),
                 }
             )
-    counted = [row for row in tables["responses"] if row["counted"]]
+    counted_rows = [row for row in tables["responses"] if row["counted"]]
     return tables | {
-        "aggregate": list(_aggregate(results, counted)),
-        "wide": list(_wide(rows["responses"], tables["trials"], counted)),
+        "aggregate": list(_aggregate(results, counted_rows)),
+        "wide": list(_wide(rows["responses"], tables["trials"], counted_rows)),
     }
 
 
@@ -153,8 +153,8 @@ def _wide(stored_rows: Rows, trials: Rows, counted: Rows) -> Iterator[dict[str, 
         for condition in sorted(set(SETTINGS) - {"learn"}):
             for item in ("smooth", "warm"):
                 answers = [row["value"] for row in own if (row["item"], row["condition"]) == (item, condition)]
-                given = [answer for answer in answers if answer is not None]
-                medians[f"{item}__{condition}"] = np.median(given) if given else None
+                given_answers = [answer for answer in answers if answer is not None]
+                medians[f"{item}__{condition}"] = np.median(given_answers) if given_answers else None
         simulated = {row["participant"]: row["simulated"] for row in stored_rows}[participant]
         groups = [row["group"] for row in trials if row["participant"] == participant and row["counted"]]
         group = next(group for group in reversed(groups) if group is not None)
@@ -177,7 +177,7 @@ def _csv(path: Path) -> Rows:
 
 
 def _frame(frame: pd.DataFrame) -> Rows:
-    """Return rows with None for what is missing, which in SPSS is also an empty text."""
+    """Return rows with None for missing values; in SPSS an empty text is also missing."""
     return [
         {str(name): None if pd.isna(value) or value == "" else value for name, value in row.items()}
         for row in frame.to_dict("records")
@@ -201,10 +201,10 @@ def test_every_cell_of_every_format_is_the_stored_one(stored: tuple[Results, dic
     expected = _expected(results, rows)
     assert {row["delay_achieved_ms"] is None for row in expected["trials"]} == {True, False}
     to = tmp_path / "out"
-    written = export(results.folder, to, extras=["wide", "parquet", "sav", "psych-ds"])
+    exported_files = export(results.folder, to, extras=["wide", "parquet", "sav", "psych-ds"])
     files = [
         (path, path.stem.split("description-")[1].removesuffix("_data"), path.suffix[1:])
-        for path in written
+        for path in exported_files
         if "description-" in path.name and path.suffix[1:] in READERS
     ]
     own = [(name, form) for path, name, form in files if path.parent == to]
@@ -246,8 +246,8 @@ def test_every_format_has_the_unit_and_the_description_of_each_column(
     stored: tuple[Results, dict[str, Rows]], tmp_path: Path
 ) -> None:
     results, _ = stored
-    written = export(results.folder, tmp_path / "out", extras=["wide", "parquet", "sav", "psych-ds"])
-    files = [path for path in written if "description-" in path.name and path.suffix[1:] in READERS]
+    exported_files = export(results.folder, tmp_path / "out", extras=["wide", "parquet", "sav", "psych-ds"])
+    files = [path for path in exported_files if "description-" in path.name and path.suffix[1:] in READERS]
     for path in files:
         columns = _described(path)
         table = path.stem.split("description-")[1].removesuffix("_data")

@@ -26,7 +26,11 @@ IDS = ["NA", "nan", "None", "NULL", "1E5", "TRUE", "007", "inf", "MAR1", "P1"]
 def test_the_documented_line_of_pandas_keeps_ids_and_texts(tmp_path: Path) -> None:
     columns = (Column("participant", "text", "Id."), Column("words", "text", "Text."), Column("age", "number", "Age."))
     file = tmp_path / "table.csv"
-    file.write_bytes(csv_bytes(columns, [{"participant": one, "words": one, "age": None} for one in IDS]))
+    file.write_bytes(
+        csv_bytes(
+            columns, [{"participant": participant_id, "words": participant_id, "age": None} for participant_id in IDS]
+        )
+    )
     (line,) = re.findall(r"`(pandas\.read_csv\(FILE[^`]*)`", documentation.page("export"))
     frame = eval(" ".join(line.split()), {"pandas": pd, "FILE": file})  # noqa: S307 - the line that readers copy
     assert frame["participant"].tolist() == IDS
@@ -66,13 +70,13 @@ def _wide_cells(results: Path, person: str) -> dict[str, str | None]:
     return cells | {"load__raw": str(sum(load) / 6), "start__since": None}
 
 
-def test_wide_tables_hold_the_stored_answers_and_say_what_was_asked(mixed: tuple[Path, Path]) -> None:
+def test_wide_tables_contain_the_stored_answers_and_the_questions(mixed: tuple[Path, Path]) -> None:
     pyreadstat = pytest.importorskip("pyreadstat", reason="the extra analysis is not installed")
     folder, out = mixed
     (file,) = out.glob("*wide_data.csv")
     rows = pd.read_csv(file, dtype=str, keep_default_na=False).set_index("participant")
-    found, about = pyreadstat.read_sav(str(file.with_suffix(".sav")), user_missing=True)
-    coded = found.set_index("participant")
+    sav_frame, about = pyreadstat.read_sav(str(file.with_suffix(".sav")), user_missing=True)
+    coded = sav_frame.set_index("participant")
     used = {"left": "Left", "right": "Right", "both": "Both"}
     for person in ("P001", "P002", "P003"):
         cells = _wide_cells(folder, person)
@@ -89,7 +93,7 @@ def test_wide_tables_hold_the_stored_answers_and_say_what_was_asked(mixed: tuple
             else:
                 assert float(held) == value == pytest.approx(float(cell)), name
     book = json.loads((out / "codebook.json").read_bytes())
-    described = {column["name"]: column for column in book["files"][file.name]}
+    columns = {column["name"]: column for column in book["files"][file.name]}
     for name, kind, description, bounds in (
         ("feels_liquid__thin", "integer", "It feels like a liquid. About Thin, in Stir.", (1, 7)),
         ("stir__thickness__thick", "integer", "How thick was it? In Stir. About Thick.", (1, 5)),
@@ -98,11 +102,11 @@ def test_wide_tables_hold_the_stored_answers_and_say_what_was_asked(mixed: tuple
         ("start__hand", "text", "Which hand do you write with? In Start.", (None, None)),
         ("load__raw", "number", "Score raw of nasa-tlx, in NASA-TLX.", (None, None)),
     ):
-        column = described[name]
+        column = columns[name]
         assert (column["description"], column.get("minimum"), column.get("maximum")) == (description, *bounds)
         assert (about.column_names_to_labels[name], column["may_miss"], column["type"]) == (description, True, kind)
     questions = {question["id"]: question for question in book["questions"]}
-    assert [(it["form"], it["name"], it["instrument"], it["items"]) for it in book["scores"]] == [
+    assert [(score["form"], score["name"], score["instrument"], score["items"]) for score in book["scores"]] == [
         ("load", "raw", "nasa-tlx", [*questions][6:12]), ("usability", "sus", "sus", [*questions][12:22]),
     ]  # fmt: skip
     assert [questions[name] for name in ("age", "hand", "since", "thickness")] == [

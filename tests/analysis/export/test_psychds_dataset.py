@@ -68,11 +68,11 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
         '#!/bin/sh\ntest -f "$1/dataset_description.json" && exit $(cat "$0.code")\n', encoding="utf-8", newline="\n"
     )
     stand_in.chmod(0o755)
-    asked = ["export", str(kitchen), "--to", str(to), "--validator", str(stand_in)]
-    assert CliRunner().invoke(commands, asked).exit_code == 2
+    command = ["export", str(kitchen), "--to", str(to), "--validator", str(stand_in)]
+    assert CliRunner().invoke(commands, command).exit_code == 2
     for code, expected in (("0", 0), ("1", 3)):
         Path(f"{stand_in}.code").write_text(code, encoding="utf-8", newline="\n")
-        assert CliRunner().invoke(commands, [*asked, "--psych-ds"]).exit_code == expected
+        assert CliRunner().invoke(commands, [*command, "--psych-ds"]).exit_code == expected
     folder = to / FOLDER
     assert undescribed(folder) == set()
     assert (folder / "materials" / "kitchen.toml").read_bytes() == (tmp_path / "protocols/kitchen.toml").read_bytes()
@@ -86,11 +86,11 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
     assert (folder / "results" / "report.html").is_file()
     assert not [path for path in (folder / "results").iterdir() if path.name.endswith("_data.csv")]
     if rscript := shutil.which("Rscript"):
-        ran = subprocess.run(
+        process = subprocess.run(
             [rscript, "analysis/report.R", "data", "results"], cwd=folder, check=False, capture_output=True
         )
-        assert ran.returncode == 0, ran.stdout
-        assert b"all numbers that R computed agree with the report" in ran.stdout
+        assert process.returncode == 0, process.stdout
+        assert b"all numbers that R computed agree with the report" in process.stdout
 
 
 @pytest.mark.usefixtures("without_report")
@@ -117,12 +117,12 @@ def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -
         (False, "Conditions appear as codes, because the study is blinded."),
     ],
 )
-def test_the_readme_says_who_took_part_and_where_what_is(is_revealed: bool, sentence: str) -> None:
+def test_the_readme_describes_participants_and_contents(is_revealed: bool, sentence: str) -> None:
     settings = liquids(2)
-    made = study(settings, list(everybody(settings, 3, lambda *_: 4)))
-    made = made if is_revealed else replace(made, settings={})
+    case_study = study(settings, list(everybody(settings, 3, lambda *_: 4)))
+    case_study = case_study if is_revealed else replace(case_study, settings={})
     tables, reports = {"a.csv": b"", "b.csv": b""}, {"report.html": b"", "report.R": b""}
-    lines = psychds_dataset._readme(made, tables, reports, ["waves.mp4", "sea.mp4"]).decode().splitlines()
+    lines = psychds_dataset._readme(case_study, tables, reports, ["waves.mp4", "sea.mp4"]).decode().splitlines()
     assert lines[0] == "# Made up"
     assert lines[2].startswith("**All participants are simulated.** This Psych-DS dataset contains data from 3 part")
     assert f". {sentence} Missing values" in lines[2]
@@ -134,19 +134,19 @@ def test_the_readme_says_who_took_part_and_where_what_is(is_revealed: bool, sent
     assert "Add the files that are missing from `materials`: waves.mp4, sea.mp4." in lines
 
 
-def test_the_file_and_the_footage_of_a_study_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_studys_protocol_file_and_footage_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = shipped_file("rek2024")
-    found = find_study_file("rek2024", {protocol_hash(file.read_bytes())}, {})
-    assert found is not None
-    assert (found[0].name, found[1]) == (file.name, (file.read_bytes(), {}, {}))
+    study_file = find_study_file("rek2024", {protocol_hash(file.read_bytes())}, {})
+    assert study_file is not None
+    assert (study_file[0].name, study_file[1]) == (file.name, (file.read_bytes(), {}, {}))
     conditions = {"fast": {"view": "b.mp4", "footage_sha256": "1f"}, "slow": {"view": "a.mp4", "footage_sha256": "2e"}}
     key = SimpleNamespace(tables={"conditions": conditions | {"none": {"view": ""}}})
     monkeypatch.setattr(psychds_dataset, "revealed_key", lambda _folder: key)
-    of_folder: Any = SimpleNamespace(folder=tmp_path)
-    assert _footage(of_folder) == {"a.mp4": "2e", "b.mp4": "1f"}
+    study: Any = SimpleNamespace(folder=tmp_path)
+    assert _footage(study) == {"a.mp4": "2e", "b.mp4": "1f"}
 
 
-def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) -> None:
+def test_footage_that_changes_during_copying_leaves_no_file(tmp_path: Path) -> None:
     source, to = tmp_path / "waves.mp4", tmp_path / "out"
     copied = FileCopy(source, hashlib.sha256(FOOTAGE).hexdigest())
     for content, says in (
@@ -169,45 +169,45 @@ def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path
     export(kitchen, tmp_path / "out", extras=["psych-ds"])
     folder = tmp_path / "out" / FOLDER
     assert (folder / "materials" / "kitchen.toml").is_file()
-    described = json.loads((folder / "dataset_description.json").read_bytes())
-    assert {name for one in described["variableMeasured"] for name in one} <= OF_SCHEMA_ORG
+    description = json.loads((folder / "dataset_description.json").read_bytes())
+    assert {name for variable in description["variableMeasured"] for name in variable} <= OF_SCHEMA_ORG
     tables = sorted((folder / "data").glob("*.csv"))
     assert tables
     for table in tables:
         sidecar = json.loads(table.with_suffix(".json").read_bytes())
         header = table.read_text(encoding="utf-8").splitlines()[0].split(",")
-        assert [one["name"] for one in sidecar["variableMeasured"]] == header
-        assert {name for one in sidecar["variableMeasured"] for name in one} <= OF_SCHEMA_ORG
+        assert [variable["name"] for variable in sidecar["variableMeasured"]] == header
+        assert {name for variable in sidecar["variableMeasured"] for name in variable} <= OF_SCHEMA_ORG
         assert (sidecar["license"], sidecar["citation"]) == ("CC-BY-4.0", "Kox and Lam (2026)")
-    of_folder = json.loads((folder / "data" / "file_metadata.json").read_bytes())
-    assert of_folder == {name: value for name, value in described.items() if name != "variableMeasured"}
-    assert described["author"] == ["A. Kox", "B. Lam"]
-    assert described["license"] == "CC-BY-4.0"
-    assert described["citation"] == "Kox and Lam (2026)"
+    metadata = json.loads((folder / "data" / "file_metadata.json").read_bytes())
+    assert metadata == {name: value for name, value in description.items() if name != "variableMeasured"}
+    assert description["author"] == ["A. Kox", "B. Lam"]
+    assert description["license"] == "CC-BY-4.0"
+    assert description["citation"] == "Kox and Lam (2026)"
     stated = "Authors: A. Kox, B. Lam.", "Licence: CC-BY-4.0.", "How to cite: Kox and Lam (2026)."
     for name in ("README.md", "results/report.html", "analysis/report.R"):
         assert all(line in (folder / name).read_text(encoding="utf-8") for line in stated), name
     settings = json.loads((folder / "analysis/settings.json").read_bytes())
-    for named in (
+    for facts in (
         settings,
         json.loads((folder / "documentation/codebook.json").read_bytes())["study"],
         json.loads((folder / "results/report.json").read_bytes())["study"],
     ):
-        assert (named["name"], named["license"], named["citation"]) == ("kitchen", "CC-BY-4.0", "Kox and Lam (2026)")
-        assert named["author"] == ["A. Kox", "B. Lam"]
+        assert (facts["name"], facts["license"], facts["citation"]) == ("kitchen", "CC-BY-4.0", "Kox and Lam (2026)")
+        assert facts["author"] == ["A. Kox", "B. Lam"]
     assert settings["analysis"]["alpha"] == 0.05
     assert not settings["analysis"].keys() & {"made", "changed"}
 
 
 def test_units_and_ranges_hold_in_every_table() -> None:
-    (one,) = merged_variables(
+    (variable,) = merged_variables(
         {
             "study-x_description-a_data.csv": (Column("n", "integer", "Points.", unit="s", minimum=1, maximum=7),),
             "study-x_description-b_data.csv": (optional("n", "number", "Seconds.", minimum=0),),
             "study-x_description-c_data.csv": (optional("n", "number", "Points.", minimum=2, maximum=9),),
         }
     )
-    assert one == {
+    assert variable == {
         "@type": "PropertyValue",
         "name": "n",
         "description": "In a, c: Points. In b: Seconds.",

@@ -40,7 +40,7 @@ UNSURE, LEFT_OUT = ("A-P001", "L2"), "B-P010"
 
 
 class Given(NamedTuple):
-    """An answer: None without one."""
+    """An answer of a participant; its value is None if it is missing."""
 
     participant: str
     code: str
@@ -59,35 +59,37 @@ def answers() -> list[Given]:
 
 
 @pytest.fixture(scope="module")
-def made(answers: list[Given]) -> Study:
+def two_site_study(answers: list[Given]) -> Study:
     """Five people of two sites; A-P001 cannot judge L2, and B-P010's session is excluded."""
     pairs = zip(answers[::2], answers[1::2], strict=True)
-    made = study(SETTINGS, [(one.participant, 1, one.code, [one.value, other.value]) for one, other in pairs])
-    trials = made.trials.assign(delay_error_mean_ms=np.arange(len(made.trials)) * 0.25 - 3)
-    rows = made.responses
+    case_study = study(
+        SETTINGS, [(answer.participant, 1, answer.code, [answer.value, other.value]) for answer, other in pairs]
+    )
+    trials = case_study.trials.assign(delay_error_mean_ms=np.arange(len(case_study.trials)) * 0.25 - 3)
+    rows = case_study.responses
     unsure = (rows["participant"] == UNSURE[0]) & (rows["code"] == UNSURE[1])
     rows = rows.assign(cannot_judge=unsure, response=rows["response"].mask(unsure), title=rows["item"])
-    tables = {"trials": trials, "responses": rows, "participants": made.participants}
+    tables = {"trials": trials, "responses": rows, "participants": case_study.participants}
     for name, table in tables.items():
         excluded = table["participant"] == LEFT_OUT
         tables[name] = table.assign(excluded=excluded, counted=~excluded)
-    (block,) = made.blocks
-    block = replace(block, items=tuple(Item(id=it, text=f"It is {it}.", short=it[:3]) for it in ITEMS))
-    return replace(made, blocks=(block,), sites=("A", "B"), answered=tables["responses"], **tables)
+    (block,) = case_study.blocks
+    block = replace(block, items=tuple(Item(id=item, text=f"It is {item}.", short=item[:3]) for item in ITEMS))
+    return replace(case_study, blocks=(block,), sites=("A", "B"), answered=tables["responses"], **tables)
 
 
-def counted(answers: list[Given]) -> Iterator[Given]:
+def counted_answers(answers: list[Given]) -> Iterator[Given]:
     for answer in answers:
         if answer.participant != LEFT_OUT and (answer.participant, answer.code) != UNSURE:
             yield answer
 
 
-def test_each_answer_has_its_own_condition_delay_and_site(made: Study, answers: list[Given]) -> None:
-    tables = {table.name: table.frame for table in exported_tables(made)}
+def test_each_answer_has_its_own_condition_delay_and_site(two_site_study: Study, answers: list[Given]) -> None:
+    tables = {table.name: table.frame for table in exported_tables(two_site_study)}
     responses = tables["responses"].astype(object)
     may_miss = [
         (table.name, column.name)
-        for table in exported_tables(made)
+        for table in exported_tables(two_site_study)
         for column in table.columns
         if column.may_miss and column.name in {"condition", "liquid", "delay_ms", "delay_achieved_ms"}
     ]
@@ -110,27 +112,29 @@ def test_each_answer_has_its_own_condition_delay_and_site(made: Study, answers: 
     assert list(tables["trials"]["delay_achieved_ms"]) == list(responses["delay_achieved_ms"][::2])
 
 
-def test_each_row_of_the_aggregate_counts_the_answers_on_one_setting(made: Study, answers: list[Given]) -> None:
-    (table,) = (table for table in exported_tables(made) if table.name == "aggregate")
-    aggregate, described = table.frame, {column.name: column.description for column in table.columns}
+def test_each_row_of_the_aggregate_counts_the_answers_on_one_setting(
+    two_site_study: Study, answers: list[Given]
+) -> None:
+    (table,) = (table for table in exported_tables(two_site_study) if table.name == "aggregate")
+    aggregate, descriptions = table.frame, {column.name: column.description for column in table.columns}
     meanings = {
         "n": "valid answers", "missing": "without an answer", "cannot_judge": "“cannot judge”", "count_3": "level 3.",
         "median": "Median", "q1": "Lower quartile", "q3": "Upper quartile", "agree_percent": "levels 5 to 7",
     }  # fmt: skip
-    assert [name for name, meaning in meanings.items() if meaning not in described[name]] == []
+    assert [name for name, meaning in meanings.items() if meaning not in descriptions[name]] == []
     assert list(zip(aggregate["code"], aggregate["item"], strict=True)) == [
         (setting.code, item) for setting in SETTINGS for item in ITEMS
     ]
     for row in aggregate.to_dict("records"):
         of_cell = [answer for answer in answers if answer[1:3] == (row["code"], row["item"])]
-        values = [answer.value for answer in counted(of_cell) if answer.value is not None]
+        values = [answer.value for answer in counted_answers(of_cell) if answer.value is not None]
         unsure = 2 * (row["code"] == UNSURE[1])
         assert (row["condition"], row["liquid"]) == (f"c{row['code'][1]}", f"oil{row['code'][1]}")
         assert (row["block"], row["short"], row["study"]) == ("b", row["item"][:3], "made_up")
         assert (row["simulated"], row["pilot"]) == (True, False)
         assert (row["n"], row["cannot_judge"], row["presented"]) == (len(values), unsure, 8)
         assert row["missing"] == 8 - len(values) - unsure
-        assert row["participants"] == len({a.participant for a in counted(of_cell) if a.value is not None})
+        assert row["participants"] == len({a.participant for a in counted_answers(of_cell) if a.value is not None})
         assert [row[f"count_{level}"] for level in range(1, 8)] == [values.count(level) for level in range(1, 8)]
         assert row["median"] == median(values)
         assert row["q1"] < row["q3"] or row["q1"] == row["q3"] == row["median"]
@@ -138,19 +142,19 @@ def test_each_row_of_the_aggregate_counts_the_answers_on_one_setting(made: Study
 
 
 @pytest.mark.parametrize("recorded_in", ["participants", "trials"])
-def test_the_wide_table_states_each_persons_group(made: Study, recorded_in: str) -> None:
+def test_the_wide_table_states_each_persons_group(two_site_study: Study, recorded_in: str) -> None:
     """Receipts state pre-existing groups; only the opened journal states randomised ones."""
     of_person = {"A-P001": "zinc", "A-P002": "amber", "B-P001": "zinc", "B-P010": "amber"}
-    tables = {name: getattr(made, name).assign(group=pd.NA) for name in ("participants", "trials")}
+    tables = {name: getattr(two_site_study, name).assign(group=pd.NA) for name in ("participants", "trials")}
     tables[recorded_in]["group"] = tables[recorded_in]["participant"].map(of_person)
-    table, _ = wide_table(replace(made, **tables))
+    table, _ = wide_table(replace(two_site_study, **tables))
     assert header(table.columns)[:4] == ("participant", "site", "simulated", "group")
     assert list(table.frame["group"].fillna("n/a")) == ["zinc", "amber", "zinc", "n/a"]
-    assert "group" not in wide_table(made)[0].frame
+    assert "group" not in wide_table(two_site_study)[0].frame
 
 
-def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answers: list[Given]) -> None:
-    table, cells = wide_table(made)
+def test_the_wide_table_has_the_median_of_each_persons_answers(two_site_study: Study, answers: list[Given]) -> None:
+    table, cells = wide_table(two_site_study)
     wide = table.frame.set_index("participant")
     assert list(wide.index) == list(PEOPLE[:-1])
     assert list(wide["site"]) == ["A", "A", "B", "B"]
@@ -161,7 +165,7 @@ def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answ
         for person in wide.index:
             values = [
                 answer.value
-                for answer in counted(answers)
+                for answer in counted_answers(answers)
                 if answer[:3] == (person, f"L{condition}", item) and answer.value is not None
             ]
             repeated |= len(values) > 1
@@ -169,31 +173,45 @@ def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answ
             assert held == median(values) if values else pd.isna(held), (name, person)
         (column,) = (column for column in table.columns if column.name == name)
         note = " The median of each participant's answers." if repeated else ""
-        assert column.description == f"It is {item}. About {made.blocks[0].name(cell.setting)}, in Block.{note}"
+        assert (
+            column.description == f"It is {item}. About {two_site_study.blocks[0].name(cell.setting)}, in Block.{note}"
+        )
         assert (column.minimum, column.maximum) == (1, 7)
         assert column.kind == ("integer" if (wide[name].dropna() % 1 == 0).all() else "number")
-    given = made.responses["response"]
-    same = wide_table(replace(made, responses=made.responses.assign(response=given.mask(given.notna(), 4))))[0]
+    responses = two_site_study.responses["response"]
+    same = wide_table(
+        replace(
+            two_site_study, responses=two_site_study.responses.assign(response=responses.mask(responses.notna(), 4))
+        )
+    )[0]
     assert {column.kind for column in same.columns[3:]} == {"integer"}
     schema = parquet.read_schema(io.BytesIO(table_files._parquet_bytes(same)))
     assert {str(schema.field(column.name).type) for column in same.columns[3:]} == {"int8"}
 
 
-def test_a_text_in_the_wide_table_is_that_of_the_last_session(made: Study, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each session numbers its trials from 1."""
+def test_repeated_texts_have_a_column_for_each_session_and_answer_in_the_wide_table(
+    two_site_study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
     texts = pd.DataFrame(
         {"participant": ["A-P002"] * 3, "session": [2, 1, 2], "trial": [3, 8, 1], "response": ["last", "first", "next"]}
     )
     form = SimpleNamespace(id="end", title="End", is_form=True, settings=())
-    asked: Any = SimpleNamespace(id="why", text="Why?", where=form, question=SimpleNamespace(value_type="text"))
+    question: Any = SimpleNamespace(id="why", text="Why?", where=form, question=SimpleNamespace(value_type="text"))
     monkeypatch.setattr(Study, "answers_to", lambda *_: texts)
-    others: Any = SimpleNamespace(questions=(asked,), scores=())
-    wide = wide_table(replace(made, others=others))[0].frame.set_index("participant")["end__why"]
-    assert wide.dropna().to_dict() == {"A-P002": "last"}
+    others: Any = SimpleNamespace(questions=(question,), scores=())
+    table = wide_table(replace(two_site_study, others=others))[0]
+    wide = table.frame.set_index("participant").filter(like="end__why")
+    assert wide.loc["A-P002"].to_dict() == {
+        "end__why__1__1": "first",
+        "end__why__2__1": "next",
+        "end__why__2__2": "last",
+    }
+    assert wide.drop(index="A-P002").isna().all(axis=None)
+    assert table.columns[-1].description == "Why? In End. Session 2, answer 2."
 
 
 def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_spss_and_codebook(
-    made: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    two_site_study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     form: Any = SimpleNamespace(
         id="end", title="End", is_form=True, settings=(Setting(code="stir"), Setting(code="again")),
@@ -201,10 +219,10 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
     )  # fmt: skip
     mild = (Setting(code="Q1", condition="mild"),)
     block: Any = SimpleNamespace(id="q", title="Oils", is_form=False, settings=mild, name=lambda it: it.condition)
-    shown: Any = SimpleNamespace(model_dump=lambda mode: {"item": "pick", "mode": mode})
+    pick_question: Any = SimpleNamespace(model_dump=lambda mode: {"item": "pick", "mode": mode})
     sure: Any = SimpleNamespace(
         where=form, id="sure", text="How sure?", short="Sure", levels={"2": "low", "9": "high"}, bounds=(2, 9),
-        cannot_judge="no idea", question=SimpleNamespace(value_type="number", kind_id="scale", show_if=shown),
+        cannot_judge="no idea", question=SimpleNamespace(value_type="number", kind_id="scale", show_if=pick_question),
     )  # fmt: skip
     options: Any = SimpleNamespace(value_type="text", kind_id="choice", show_if=None, names_several=False)
     pick: Any = SimpleNamespace(
@@ -213,15 +231,15 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
     )  # fmt: skip
     score: Any = SimpleNamespace(model_dump=lambda mode, exclude_defaults: {"mean_of": ["sure"]})
     raw = PlacedScore(form, "raw", "tlx", score, ())
-    given = pd.DataFrame(
+    rows = pd.DataFrame(
         [
             *(("A-P001", "stir", value) for value in (3, 8, 4)), ("A-P002", "stir", 7), ("A-P001", "again", 8),
             ("A-P002", "again", None), ("B-P001", "again", None),
         ],
         columns=["participant", "code", "value"],
     )  # fmt: skip
-    given = given.assign(counted=given["participant"] != "B-P001", excluded=given["participant"] == "B-P001")
-    given = given.assign(cannot_judge=given["counted"] & given["value"].isna(), score=given["value"] * 10 + 1)
+    rows = rows.assign(counted=rows["participant"] != "B-P001", excluded=rows["participant"] == "B-P001")
+    rows = rows.assign(cannot_judge=rows["counted"] & rows["value"].isna(), score=rows["value"] * 10 + 1)
     picked = pd.DataFrame(
         [
             ("A-P001", "Q1", "o", 2, 1),
@@ -231,22 +249,22 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
         ],
         columns=["participant", "code", "response", "session", "trial"],
     ).assign(counted=True, excluded=False, cannot_judge=False)
-    monkeypatch.setattr(Study, "rows_in", lambda _study, where: given if where is form else picked)
+    monkeypatch.setattr(Study, "rows_in", lambda _study, where: rows if where is form else picked)
     for method in ("answers_to", "rows_of"):
-        monkeypatch.setattr(Study, method, lambda _study, question: given if question is sure else picked)
-    monkeypatch.setattr("study_app.analysis.export.tables.scored", lambda _study, _score: given)
+        monkeypatch.setattr(Study, method, lambda _study, question: rows if question is sure else picked)
+    monkeypatch.setattr("study_app.analysis.export.tables.scored", lambda _study, _score: rows)
     of_levels: Any = SimpleNamespace(id="size", where=SimpleNamespace(id="track", settings=()))
-    asked = replace(made, others=OtherQuestions(questions=(sure, pick, of_levels), scores=(raw,)))
+    questions_study = replace(two_site_study, others=OtherQuestions(questions=(sure, pick, of_levels), scores=(raw,)))
     track: Any = SimpleNamespace(id="track")
-    assert "track__size" not in wide_table(replace(asked, levels=(track,)))[1]
-    asked = replace(made, others=OtherQuestions(questions=(sure, pick), scores=(raw,)))
-    table, cells = wide_table(asked)
+    assert "track__size" not in wide_table(replace(questions_study, levels=(track,)))[1]
+    questions_study = replace(two_site_study, others=OtherQuestions(questions=(sure, pick), scores=(raw,)))
+    table, cells = wide_table(questions_study)
     median = " The median of each participant's answers (hypotheses and the first page of the report use the mean)."
-    last = " The last of each participant's answers."
     expected = {
         "end__sure__stir": (4, 7, f"How sure? In End. After stir.{median}", 2, 9),
         "end__sure__again": (8, None, "How sure? In End. After again.", 2, 9),
-        "q__pick__mild": ("o", "w", f"Pick one. In Oils. About mild.{last}", None, None),
+        "q__pick__mild__1": ("w", "w", "Pick one. In Oils. About mild. Session 1, answer 1.", None, None),
+        "q__pick__mild__2": ("o", None, "Pick one. In Oils. About mild. Session 2, answer 1.", None, None),
         "end__raw__stir": (41, 71, f"Score raw of tlx, in End. After stir.{median}", None, None),
         "end__raw__again": (81, None, "Score raw of tlx, in End. After again.", None, None),
     }
@@ -257,18 +275,18 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
         assert held == [first, second, None, None], name
         column = columns[name]
         assert (column.description, column.minimum, column.maximum) == (description, minimum, maximum)
-    (tmp_path / "wide.sav").write_bytes(spss.wide_sav(asked, table, cells))
+    (tmp_path / "wide.sav").write_bytes(spss.wide_sav(questions_study, table, cells))
     frame, about = pyreadstat.read_sav(tmp_path / "wide.sav", user_missing=True)
-    assert frame[["end__sure__stir", "end__sure__again", "q__pick__mild", "end__raw__stir"]].fillna(
+    assert frame[["end__sure__stir", "end__sure__again", "q__pick__mild__2", "end__raw__stir"]].fillna(
         -1
-    ).T.to_numpy().tolist() == [[4, 7, 99, 99], [8, 98, 97, 99], [1, 2, 99, 99], [41, 71, -1, -1]]
+    ).T.to_numpy().tolist() == [[4, 7, 99, 99], [8, 98, 97, 99], [1, 99, 99, 99], [41, 71, -1, -1]]
     off = {96: "Not shown", 97: "Excluded", 99: "No answer"}
     labels = {"end__sure__again": {2: "low", 9: "high", 98: "no idea", **off}}
-    labels["q__pick__mild"] = {1: "Oil", 2: "Water", 98: "Cannot judge", **off}
+    labels["q__pick__mild__2"] = {1: "Oil", 2: "Water", 98: "Cannot judge", **off}
     assert {name: about.variable_value_labels[name] for name in labels} == labels
-    measures = {"end__sure__again": "ordinal", "q__pick__mild": "nominal", "end__raw__stir": "scale"}
+    measures = {"end__sure__again": "ordinal", "q__pick__mild__2": "nominal", "end__raw__stir": "scale"}
     assert {name: about.variable_measure[name] for name in measures} == measures
-    book = json.loads(codebook_bytes(asked, {}))
+    book = json.loads(codebook_bytes(questions_study, {}))
     assert book["questions"] == [
         {
             "form": "end", "id": "sure", "kind": "scale", "text": "How sure?", "short": "Sure", "range": [2, 9],
@@ -283,19 +301,19 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
 
 
 def test_the_codebook_counts_answers_and_names_conditions_with_the_same_delay(
-    made: Study, answers: list[Given]
+    two_site_study: Study, answers: list[Given]
 ) -> None:
     settings = tuple(
         replace(setting, delay_ms=delay_ms) for setting, delay_ms in zip(SETTINGS, (40.0, 10.0, 10.0), strict=True)
     )
-    block = replace(made.blocks[0], kind="delays", settings=settings)
+    block = replace(two_site_study.blocks[0], kind="delays", settings=settings)
     counts = Counter(
         (answer.participant, answer.code == "L1", answer.item)
-        for answer in counted(answers)
+        for answer in counted_answers(answers)
         if answer.value is not None
     ).values()
     assert min(counts) < 2 < max(counts)
-    assert table_files._presentations(made, block) == {
+    assert table_files._presentations(two_site_study, block) == {
         "answers_per_participant_setting_and_item": [min(counts), max(counts)],
         "sessions": [1],
         "replicates": [["L2", "L3"]],
@@ -304,15 +322,15 @@ def test_the_codebook_counts_answers_and_names_conditions_with_the_same_delay(
 
 @pytest.mark.slow
 def test_the_codebook_and_the_sav_file_name_every_level_setting_and_missing_answer(
-    made: Study, answers: list[Given], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    two_site_study: Study, answers: list[Given], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("study_app.analysis.export.table_files.reveals_of", lambda _folder: ({"by": "AK"},))
-    table, cells = wide_table(made)
+    table, cells = wide_table(two_site_study)
     excluded = Exclusion(
         participant=LEFT_OUT, session=1, trial=None, rule_or_person="AK", reason="spoke", excluded_at="t"
     )
-    block = replace(made.blocks[0], labels=tuple("abcdefg"), cannot_judge="unsure")
-    labelled = replace(made, blocks=(block,), exclusions=(excluded,))
+    block = replace(two_site_study.blocks[0], labels=tuple("abcdefg"), cannot_judge="unsure")
+    labelled = replace(two_site_study, blocks=(block,), exclusions=(excluded,))
     cells = {name: replace(cell, block=labelled.blocks[0]) for name, cell in cells.items()}
     files = table_files.table_files(labelled, (*exported_tables(labelled), table), ("sav", "wide", "parquet"), cells)
     book: dict[str, Any] = json.loads(files["codebook.json"])
@@ -354,9 +372,9 @@ def test_missing_answers_have_the_code_of_their_reason() -> None:
         }
     )
     others = pd.DataFrame({"participant": ["P1", "P6", "P7"], "counted": [True, True, False]})
-    asked = pd.concat([rows, others.assign(cannot_judge=False, excluded=[False, False, True])])
+    answer_rows = pd.concat([rows, others.assign(cannot_judge=False, excluded=[False, False, True])])
     values = pd.Series([4, *[None] * 7], dtype="Float64")
-    coded = spss._code_missing_answers(values, people, rows, asked)
+    coded = spss._code_missing_answers(values, people, rows, answer_rows)
     labels = spss._value_labels({4: "four"}, "unsure")
     assert [labels[int(value)] for value in coded] == [
         "four", "unsure", "Excluded", "No answer", "No answer", "Not shown", "Excluded", "No answer",
@@ -379,7 +397,7 @@ COLUMNS = (
 )
 
 
-def test_each_column_of_sav_has_its_label_format_measure_and_values(made: Study, tmp_path: Path) -> None:
+def test_each_column_of_sav_has_its_label_format_measure_and_values(two_site_study: Study, tmp_path: Path) -> None:
     rows = {
         "a_text": ["x", None],
         "a_flag": [True, None],
@@ -391,8 +409,10 @@ def test_each_column_of_sav_has_its_label_format_measure_and_values(made: Study,
     frame = pd.DataFrame({name: pd.array(values, dtype=types[name]) for name, values in rows.items()})
     path = tmp_path / "x.sav"
     labels = {1: "low", 96: "Not shown", 97: "Excluded", 99: "No answer"}
-    path.write_bytes(spss.sav(replace(made, version="2.5"), ExportTable("t", COLUMNS, frame), {"a_whole": labels}))
-    found, about = pyreadstat.read_sav(path, user_missing=True)
+    path.write_bytes(
+        spss.sav(replace(two_site_study, version="2.5"), ExportTable("t", COLUMNS, frame), {"a_whole": labels})
+    )
+    labelled_frame, about = pyreadstat.read_sav(path, user_missing=True)
     assert about.file_label == "Made up (made_up 2.5)"
     assert about.column_names_to_labels == {
         "a_text": "Words. [m]", "a_flag": "Whether.", "a_whole": "Count.", "a_number": "Length. [mm]",
@@ -404,7 +424,7 @@ def test_each_column_of_sav_has_its_label_format_measure_and_values(made: Study,
     assert about.missing_ranges == {"a_whole": [{"lo": 96, "hi": 99}]}
     formats = {"a_flag": "F1.0", "a_whole": "F4.0"}
     assert {name: about.original_variable_types[name] for name in formats} == formats
-    assert found.astype(object).where(found.notna(), None).to_numpy().tolist() == [
+    assert labelled_frame.astype(object).where(labelled_frame.notna(), None).to_numpy().tolist() == [
         ["x", 1, 3, 0.5, "z"], ["", None, 4711, None, "y"],
     ]  # fmt: skip
 
@@ -421,9 +441,14 @@ STATED = {
 }
 
 
-def test_the_codebook_describes_columns_doubts_and_credits(made: Study) -> None:
-    changed: Any = SimpleNamespace(path=made.folder / "data" / "x.csv", what="differs")
-    credited = replace(made, doubts=(changed,), protocol={**made.protocol, "study": {"credits": CREDITS}}, settings={})
+def test_the_codebook_describes_columns_doubts_and_credits(two_site_study: Study) -> None:
+    changed: Any = SimpleNamespace(path=two_site_study.folder / "data" / "x.csv", what="differs")
+    credited = replace(
+        two_site_study,
+        doubts=(changed,),
+        protocol={**two_site_study.protocol, "study": {"credits": CREDITS}},
+        settings={},
+    )
     book = json.loads(codebook_bytes(credited, {"a.csv": COLUMNS}))
     assert {name: book["study"][name] for name in STATED} == STATED
     assert (book["study"]["name"], book["study"]["title"], book["study"]["version"]) == ("made_up", "Made up", "1")
@@ -449,19 +474,21 @@ def test_the_codebook_describes_columns_doubts_and_credits(made: Study) -> None:
         ]
     }  # fmt: skip
     assert credit_lines(credited) == ("Authors: A. Kox, B. Lam.", "Licence: CC0.", "How to cite: Kox (2026).")
-    assert credit_lines(made) == (
+    assert credit_lines(two_site_study) == (
         "Authors: not stated.",
         "Licence: not stated; ask the authors before you use the data.",
         "How to cite: not stated; cite the study, its version and its authors.",
     )
-    greek = replace(made, title="Ölε", sites=())
+    greek = replace(two_site_study, title="Ölε", sites=())
     text = codebook_bytes(greek, {}).decode()
     assert text.startswith('{\n  "study": {\n    "name": "made_up",\n    "title": "Ölε",\n')
-    assert not [one.name for one in (*exported_tables(greek), wide_table(greek)[0]) if "site" in one.frame]
-    of_levels: Any = replace(made, levels=(made.blocks[0],))
+    assert not [
+        exported.name for exported in (*exported_tables(greek), wide_table(greek)[0]) if "site" in exported.frame
+    ]
+    of_levels: Any = replace(two_site_study, levels=(two_site_study.blocks[0],))
     sealed = sealed_interval_columns(of_levels)
     assert sealed == {*header(INTERVALS)} - {*header(unsealed_columns(INTERVALS))} != set()
-    assert sealed_interval_columns(made) == set()
+    assert sealed_interval_columns(two_site_study) == set()
     design, varied = (
         SimpleNamespace(kind="pair", name="higher"),
         SimpleNamespace(vary="pitch_hz", level_kind="weber", direction="up", unit="Hz"),
@@ -474,22 +501,22 @@ def test_the_codebook_describes_columns_doubts_and_credits(made: Study) -> None:
     entry = {"block": "pitch", "title": "Pitch", "phase": "main", "design": "pair", "item": "higher"}
     assert book["levels"] == [entry, {**entry, "vary": "pitch_hz", "level": "weber", "direction": "up"}]
     assert book["sealed_columns"] == sorted(SEALED | sealed)
-    assert json.loads(codebook_bytes(made, {}))["sealed_columns"] == []
+    assert json.loads(codebook_bytes(two_site_study, {}))["sealed_columns"] == []
     table = ExportTable("trials", COLUMNS, pd.DataFrame())
-    assert file_name(made, table, "sav") == "study-made_up_description-trials_data.sav"
+    assert file_name(two_site_study, table, "sav") == "study-made_up_description-trials_data.sav"
 
 
-def test_the_folder_to_share_has_each_file_in_its_place(made: Study, monkeypatch: pytest.MonkeyPatch) -> None:
-    missing, held = ("waves.mp4",), {"kitchen.toml": b"k"}
-    monkeypatch.setattr(psychds_dataset, "materials", lambda _study: psychds_dataset.Materials(held, missing))
+def test_the_folder_to_share_has_each_file_in_its_place(two_site_study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    missing, study_files = ("waves.mp4",), {"kitchen.toml": b"k"}
+    monkeypatch.setattr(psychds_dataset, "materials", lambda _study: psychds_dataset.Materials(study_files, missing))
     head = {"languages": ["nl", "en"], "description": {"nl": "Olie", "en": "Oil"}, "credits": CREDITS}
-    shared = replace(made, protocol={"study": head, "analysis": {"alpha": 0.04}}, version="2.5")
+    shared = replace(two_site_study, protocol={"study": head, "analysis": {"alpha": 0.04}}, version="2.5")
     tables = {f"study-made_up_description-{name}_data.csv": name.encode() for name in ("trials", "wide")}
     columns = {name: COLUMNS[:2] if "trials" in name else COLUMNS[1:3] for name in tables}
     report = {**dict.fromkeys(tables, b"older"), "report.R": b"R", "report.html": b"page", "codebook.json": b"book"}
     files = psychds_dataset.dataset_files(shared, tables, columns, report)
     contents = {name.removeprefix("psych-ds/"): content for name, content in files.items()}
-    described, metadata, wide, settings, protocol = (
+    dataset_description, metadata, wide, settings, protocol = (
         json.loads(contents.pop(name))
         for name in (
             "dataset_description.json", "data/file_metadata.json", "data/study-made_up_description-wide_data.json",
@@ -504,17 +531,21 @@ def test_the_folder_to_share_has_each_file_in_its_place(made: Study, monkeypatch
         ".psychds-ignore": b".psychds-ignore\n", "analysis/report.R": b"R", "results/report.html": b"page",
         "materials/kitchen.toml": b"k", **{f"data/{name}": content for name, content in tables.items()},
     }  # fmt: skip
-    assert {name: described.pop(name) for name in ("name", "alternateName", "description", "version")} == {
+    assert {name: dataset_description.pop(name) for name in ("name", "alternateName", "description", "version")} == {
         "name": "made_up", "alternateName": "Made up", "description": "Oil", "version": "2.5",
     }  # fmt: skip
-    assert [one["name"] for one in described.pop("variableMeasured")] == ["a_text", "a_flag", "a_whole"]
+    assert [variable["name"] for variable in dataset_description.pop("variableMeasured")] == [
+        "a_text",
+        "a_flag",
+        "a_whole",
+    ]
     assert metadata == {
-        **described,
+        **dataset_description,
         **{name: metadata[name] for name in ("name", "alternateName", "description", "version")},
     }
-    assert described["keywords"][-1] == "simulated"
-    assert {name: described[name] for name in STATED} == {name: wide[name] for name in STATED} == STATED
-    assert (wide["name"], [one["name"] for one in wide["variableMeasured"]]) == (
+    assert dataset_description["keywords"][-1] == "simulated"
+    assert {name: dataset_description[name] for name in STATED} == {name: wide[name] for name in STATED} == STATED
+    assert (wide["name"], [variable["name"] for variable in wide["variableMeasured"]]) == (
         "study-made_up_description-wide_data", ["a_flag", "a_whole"],
     )  # fmt: skip
     assert (settings["name"], settings["version"], settings["license"]) == ("made_up", "2.5", "CC0")
@@ -528,7 +559,7 @@ def test_the_folder_to_share_has_each_file_in_its_place(made: Study, monkeypatch
 
 
 def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
-    made: Study, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    two_site_study: Study, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     file, digests = tmp_path / "kitchen.toml", {}
     for name in ("in.mp4", "other.mp4"):
@@ -536,9 +567,9 @@ def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
         digests[name] = hashlib.sha256(b"in.mp4").hexdigest()
     digests |= {"../out.mp4": "1f", "/abs.mp4": "2e", "gone.mp4": "3d"}
     monkeypatch.setattr(psychds_dataset, "_footage", lambda _study: digests)
-    found = file, StudySource(b"text", {"oil.toml": "oil", "../no.toml": "no"})
-    monkeypatch.setattr(psychds_dataset, "find_study_file", lambda *_: found)
-    own = psychds_dataset.materials(made)
+    study_file = file, StudySource(b"text", {"oil.toml": "oil", "../no.toml": "no"})
+    monkeypatch.setattr(psychds_dataset, "find_study_file", lambda *_: study_file)
+    own = psychds_dataset.materials(two_site_study)
     copy = psychds_dataset.FileCopy(tmp_path / "in.mp4", digests["in.mp4"])
     assert own.files == {"kitchen.toml": b"text", "oil.toml": b"oil", "in.mp4": copy}
     outside = "the file is outside the study's folder"
@@ -548,8 +579,11 @@ def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
         "gone.mp4 (SHA-256 3d; the file cannot be read: No such file or directory)",
     )  # fmt: skip
     monkeypatch.setattr(psychds_dataset, "find_study_file", lambda *_: None)
-    assert psychds_dataset.materials(made).missing[:2] == ("the study file", f"in.mp4 (SHA-256 {digests['in.mp4']})")
-    assert psychds_dataset.materials(replace(made, settings={})) == ({}, ())
+    assert psychds_dataset.materials(two_site_study).missing[:2] == (
+        "the study file",
+        f"in.mp4 (SHA-256 {digests['in.mp4']})",
+    )
+    assert psychds_dataset.materials(replace(two_site_study, settings={})) == ({}, ())
     for name, text, is_of in (
         ("a", '[study]\nname = "oil"', True),
         ("b", '[study]\nname = "wax"', False),
@@ -561,9 +595,9 @@ def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
 
 
 def test_the_tables_of_levels_have_all_intervals_groups_and_results_once_the_key_is_open(
-    made: Study, monkeypatch: pytest.MonkeyPatch
+    two_site_study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One block has two intervals in a trial, the other three."""
+    """One block has two intervals per trial, the other three."""
     sealed = {*header(INTERVALS)} - {*header(unsealed_columns(INTERVALS))}
     intervals = pd.DataFrame(
         {name: [name] for name in (*header(INTERVALS), *header((*table_module.JUDGED, TRIALS_MISSING)))}
@@ -590,11 +624,11 @@ def test_the_tables_of_levels_have_all_intervals_groups_and_results_once_the_key
 
     kinds = [statistic(table, is_exported=True), statistic("none", is_exported=False)]
     monkeypatch.setattr(table_module, "statistics", lambda: kinds)
-    opened = replace(made, levels=levels, intervals=intervals)
-    found = {one.name: one for one in table_module._level_tables(opened)}
-    assert list(found) == ["intervals", "tracks", table]
-    assert set(header(found["intervals"].columns)) >= sealed
-    tracks = found["tracks"]
+    unblinded = replace(two_site_study, levels=levels, intervals=intervals)
+    tables_by_name = {exported.name: exported for exported in table_module._level_tables(unblinded)}
+    assert list(tables_by_name) == ["intervals", "tracks", table]
+    assert set(header(tables_by_name["intervals"].columns)) >= sealed
+    tracks = tables_by_name["tracks"]
     assert list(tracks.frame["level_asked"]) == [0.5, 0.25]
     assert list(tracks.frame["condition"]) == ["c1", "c2"]
     numbered = [column for column in tracks.columns if column.name.startswith("force_mean_n_")]
@@ -602,26 +636,31 @@ def test_the_tables_of_levels_have_all_intervals_groups_and_results_once_the_key
     assert [column.description[-15:] for column in numbered] == [f" In interval {number}." for number in (1, 2, 3)]
     assert tracks.frame["force_mean_n_1"].isna().all()
     assert list(tracks.frame["force_mean_n_2"]) == [7.0, 8.0]
-    results = found[table].frame
+    results = tables_by_name[table].frame
     assert [list(results[name]) for name in ("participant", "group", "study", "simulated", "pilot")] == [
         ["A-P001", "B-P001"], ["old", "new"], ["made_up"] * 2, [True] * 2, [False] * 2,
     ]  # fmt: skip
-    closed = list(table_module._level_tables(replace(opened, settings={})))
-    assert [one.name for one in closed] == ["intervals"]
+    closed = list(table_module._level_tables(replace(unblinded, settings={})))
+    assert [exported.name for exported in closed] == ["intervals"]
     assert not set(header(closed[0].columns)) & sealed
-    assert list(table_module._level_tables(made)) == []
+    assert list(table_module._level_tables(two_site_study)) == []
 
 
-def test_a_wide_column_is_named_with_its_block_only_if_another_block_has_the_name(made: Study) -> None:
-    (block,) = made.blocks
+def test_a_wide_column_is_named_with_its_block_only_if_another_block_has_the_name(two_site_study: Study) -> None:
+    (block,) = two_site_study.blocks
     other = replace(block, id="c", items=block.items[:1])
-    _, cells = wide_table(replace(made, blocks=(block, other)))
+    _, cells = wide_table(replace(two_site_study, blocks=(block, other)))
     shared, own = (item.id for item in block.items)
     assert list(cells) == [name for place in (1, 2, 3) for name in (f"b__{shared}__c{place}", f"{own}__c{place}")] + [
         f"c__{shared}__c{place}" for place in (1, 2, 3)
     ]
-    people = made.participants.assign(simulated=made.participants["participant"] == "B-P001")
-    assert list(wide_table(replace(made, participants=people))[0].frame["simulated"]) == [False, False, True, False]
+    people = two_site_study.participants.assign(simulated=two_site_study.participants["participant"] == "B-P001")
+    assert list(wide_table(replace(two_site_study, participants=people))[0].frame["simulated"]) == [
+        False,
+        False,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -634,7 +673,7 @@ def test_a_wide_column_is_named_with_its_block_only_if_another_block_has_the_nam
     ],
 )
 def test_each_format_has_its_tables(
-    extras: Any, written: dict[str, str], made: Study, monkeypatch: pytest.MonkeyPatch
+    extras: Any, written: dict[str, str], two_site_study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The first table is that of the answers; tracks are added to the .sav files."""
     monkeypatch.setattr(table_files, "codebook_bytes", lambda _study, files: repr(sorted(files)).encode())
@@ -643,13 +682,13 @@ def test_each_format_has_its_tables(
     monkeypatch.setattr(table_files.spss, "sav", lambda _study, table, _coded: f"sav {table.name}")
     monkeypatch.setattr(table_files.spss, "wide_sav", lambda _study, table, _cells: f"sav {table.name}")
     names = ["trials", "tracks", "wide"] if "sav" in extras else ["trials", "wide"]
-    given = [ExportTable(name, (), pd.DataFrame()) for name in names]
-    files: dict[str, Any] = dict(table_files.table_files(made, given, extras, {}))
+    tables = [ExportTable(name, (), pd.DataFrame()) for name in names]
+    files: dict[str, Any] = dict(table_files.table_files(two_site_study, tables, extras, {}))
     book = files.pop("codebook.json").decode()
     if "sav" in extras:
         written = {**written, "csv": "trials tracks"}
     expected = {
-        file_name(made, ExportTable(name, (), pd.DataFrame()), ending): f"{ending} {name}"
+        file_name(two_site_study, ExportTable(name, (), pd.DataFrame()), ending): f"{ending} {name}"
         for ending, of_ending in written.items()
         for name in of_ending.split()
     }
@@ -657,7 +696,7 @@ def test_each_format_has_its_tables(
     assert book == repr(sorted(name for name in expected if name.endswith(".csv")))
 
 
-def test_parquet_describes_each_column_with_its_unit_and_small_whole_numbers(made: Study) -> None:
+def test_parquet_describes_each_column_with_its_unit_and_small_whole_numbers(two_site_study: Study) -> None:
     frame = pd.DataFrame({"a_text": ["x"], "a_flag": [True], "a_whole": [7], "a_number": [0.5], "a time": ["z"]})
     schema = parquet.read_schema(io.BytesIO(table_files._parquet_bytes(ExportTable("t", COLUMNS, frame))))
     assert [str(schema.field(column.name).type) for column in COLUMNS] == ["string", "bool", "int8", "double", "string"]
@@ -676,7 +715,7 @@ def test_a_text_in_sav_is_cut_between_characters_and_ends_with_an_ellipsis() -> 
     assert spss._truncate("abcdefghijk", 10) == "abcdefg…"
 
 
-def test_an_answer_has_the_delay_of_its_own_session_and_the_condition_behind_a_track(made: Study) -> None:
+def test_an_answer_has_the_delay_of_its_own_session_and_the_condition_behind_a_track(two_site_study: Study) -> None:
     """Each session numbers its trials from 1; the setting of a track names the condition that it presents."""
     place = {"participant": ["A-P001"] * 2, "session": [1, 2], "trial": [1, 1], "attempt": [1, 1]}
     trials = pd.DataFrame({**place, "delay_error_mean_ms": [1.5, -2.5]})
@@ -686,16 +725,16 @@ def test_an_answer_has_the_delay_of_its_own_session_and_the_condition_behind_a_t
         ("pitch", "T1"): Setting(code="T1", condition="8/1", of=behind),
         ("pitch", "T2"): replace(behind, code="T2"),
     }
-    shown = replace(made, answered=answers, trials=trials, settings=settings)
-    frame = table_module._add_conditions(shown, table_module._add_delay_error(shown))
+    study_of_answers = replace(two_site_study, answered=answers, trials=trials, settings=settings)
+    frame = table_module._add_conditions(study_of_answers, table_module._add_delay_error(study_of_answers))
     assert list(frame["delay_achieved_ms"]) == [57.5, 61.5]
-    opened = [list(frame[name]) for name in ("condition", "liquid", "delay_ms")]
-    assert opened == [["late"] * 2, ["oil"] * 2, [60.0] * 2]
+    condition_cells = [list(frame[name]) for name in ("condition", "liquid", "delay_ms")]
+    assert condition_cells == [["late"] * 2, ["oil"] * 2, [60.0] * 2]
 
 
-def test_a_long_label_of_an_answer_is_cut_in_sav(made: Study, tmp_path: Path) -> None:
+def test_a_long_label_of_an_answer_is_cut_in_sav(two_site_study: Study, tmp_path: Path) -> None:
     """SPSS cuts the label of a value after 120 bytes, without a word."""
     table = ExportTable("t", COLUMNS[2:3], pd.DataFrame({"a_whole": pd.array([1], "Int64")}))
-    (tmp_path / "x.sav").write_bytes(spss.sav(made, table, {"a_whole": {1: "w" * 200}}))
+    (tmp_path / "x.sav").write_bytes(spss.sav(two_site_study, table, {"a_whole": {1: "w" * 200}}))
     _, about = pyreadstat.read_sav(tmp_path / "x.sav")
     assert about.variable_value_labels == {"a_whole": {1: f"{'w' * 117}…"}}

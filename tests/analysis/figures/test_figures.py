@@ -30,18 +30,18 @@ from tests.analysis.conftest import HIDDEN, Results, twelve
 pytestmark = pytest.mark.slow
 
 
-def drawn(study: Study, block: Block, fonts: tuple[str, ...] = ()) -> Figure:
+def block_figure(study: Study, block: Block, fonts: tuple[str, ...] = ()) -> Figure:
     words = answer_figures.counts(study, block)
     look = Look(answer_figures.title(block), study_marks(study), words, fonts or style.fonts())
     return answer_figures.draw_block(study, block, {}, look).figure
 
 
 def liquids(study: Study, **look: Any) -> Figure:
-    return drawn(study, study.blocks_of("liquids")[0], **look)
+    return block_figure(study, study.blocks_of("liquids")[0], **look)
 
 
 def delays(study: Study, **look: Any) -> Figure:
-    return drawn(study, study.blocks_of("delays")[0], **look)
+    return block_figure(study, study.blocks_of("delays")[0], **look)
 
 
 def check_texts(figure: Figure) -> None:
@@ -63,7 +63,7 @@ def test_a_short_statement_leaves_room_for_the_title_of_the_counts(rek: Results)
     rek.open()
     study = load_study(rek.folder)
     block = study.blocks_of("liquids")[0]
-    check_texts(drawn(study, replace(block, items=(replace(block.items[0], short="Wet"),))))
+    check_texts(block_figure(study, replace(block, items=(replace(block.items[0], short="Wet"),))))
 
 
 @pytest.mark.parametrize("fonts", [style.fonts(), style.FALLBACK_FONTS], ids=["screen", "print"])
@@ -81,7 +81,7 @@ def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opene
                 assert not any(text.get_window_extent().overlaps(axes.bbox) for axes in figure.axes), text.get_text()
 
 
-def test_nothing_hidden_is_in_any_blinded_file(small: Results, tmp_path: Path) -> None:
+def test_blinded_figures_contain_no_hidden_name(small: Results, tmp_path: Path) -> None:
     small.add("A", lambda *_: 3)
     for path in study_figures.plot(small.folder, tmp_path / "out"):
         content = path.read_bytes().lower()
@@ -89,32 +89,30 @@ def test_nothing_hidden_is_in_any_blinded_file(small: Results, tmp_path: Path) -
             assert word.encode() not in content, path.name
     small.open()
     study_figures.plot(small.folder, tmp_path / "out")
-    assert b"Lightquorn" not in (tmp_path / "out" / "liquids.svg").read_bytes()
-    assert b">Quorn<" in (tmp_path / "out" / "liquids.svg").read_bytes()
+    assert b">Lightquorn<" in (tmp_path / "out" / "liquids.svg").read_bytes()
 
 
-def test_without_a_completed_session_plot_says_so_and_writes_nothing(rek: Results, tmp_path: Path) -> None:
+def test_plot_without_a_completed_session_reports_it_and_writes_no_file(rek: Results, tmp_path: Path) -> None:
     rek.add("P001", lambda *_: 4, status="unfinished", trials=3)
     with pytest.raises(AnalysisError, match="P001 session 1 unfinished"):
         study_figures.plot(rek.folder, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
+def test_the_median_is_of_all_participants_even_if_only_some_are_drawn() -> None:
     values = np.tile(np.array([1.0, 2.0, 3.0]), (500, 1))
     values[::2] += 1
     look = Look("Answers", [], ["n = 500"], style.FALLBACK_FONTS)
     figure = answer_figures.draw_answers([("Harder", values)], [0.0, 100.0, 200.0], [None], "", look).figure
     gids = {str(line.get_gid()): line for line in figure.axes[0].lines}
-    drawn = [gid for gid in gids if "participant" in gid]
-    assert len(drawn) == answer_figures.MOST_LINES
-    assert {"item1-participant1", "item1-participant500"} <= set(drawn)
+    participant_lines = [gid for gid in gids if "participant" in gid]
+    assert len(participant_lines) == answer_figures.MOST_LINES
+    assert {"item1-participant1", "item1-participant500"} <= set(participant_lines)
     assert np.asarray(gids["item1-median"].get_ydata()).tolist() == [1.5, 2.5, 3.5]
     assert (
-        answer_figures.line_words(500)
-        == "60 of the 500 participants, selected at regular intervals from the sorted IDs"
+        answer_figures.line_text(500) == "60 of the 500 participants, selected at regular intervals from the sorted IDs"
     )
-    assert answer_figures.line_words(60) == "participants"
+    assert answer_figures.line_text(60) == "participants"
 
 
 def shown(figure: Figure) -> list[Text]:
@@ -169,17 +167,17 @@ def test_an_answer_is_as_wide_as_fits_and_each_side_has_room_for_its_label(
     row |= {"n": n, "presented": n + unanswered, "presented_excluded": excluded}
     fewer = dict.fromkeys(row, 0)
     widths = answer_figures._panel_widths([pd.DataFrame([fewer, row]), pd.DataFrame([fewer])], room)
-    found = (widths.left, widths.right, widths.neutral, widths.n)
-    assert found == pytest.approx(sides, rel=0.01)
+    side_widths = (widths.left, widths.right, widths.neutral, widths.n)
+    assert side_widths == pytest.approx(sides, rel=0.01)
     assert widths.total <= room
 
 
 @pytest.mark.parametrize("beside", [False, True])
 def test_a_png_is_shown_at_two_fifths_of_its_width_with_its_caption(beside: bool) -> None:
     png = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 500, 300)
-    shown = first_page.picture(Picture(block="b", name="f", caption="Is <it> so?", files={"png": png}), beside=beside)
+    html = first_page.picture(Picture(block="b", name="f", caption="Is <it> so?", files={"png": png}), beside=beside)
     caption = "" if beside else '<figcaption class="soft">Is &lt;it&gt; so?</figcaption>'
-    assert shown == (
+    assert html == (
         '<figure><img width="200" alt="Is &lt;it&gt; so?" src="data:image/png;base64,'
         f'{base64.b64encode(png).decode()}">{caption}</figure>'
     )
@@ -192,8 +190,8 @@ def test_an_svg_has_the_colours_of_the_page_and_its_size() -> None:
         f'<g fill="{style.ACCENT}" stroke="#FFFFFF"/><text fill="{style.TEXT}">t</text>'
         f'<text fill="#ffffff">{style.TEXT}</text></svg>'
     )
-    one = Picture(block="b", name="f", caption='A "b"', files={"svg": svg.encode()})
-    assert first_page.picture(one, beside=True) == (
+    picture = Picture(block="b", name="f", caption='A "b"', files={"svg": svg.encode()})
+    assert first_page.picture(picture, beside=True) == (
         '<figure><svg role="img" aria-label="A &#34;b&#34;" style="width: 399px; --share: 50%; --least: '
         f'{math.ceil(11 / SMALL * 210)}px" viewBox="0 0 210 90" id="a">'
         '<g fill="var(--accent)" stroke="var(--paper)"/><text fill="var(--text)">t</text>'
@@ -217,10 +215,10 @@ def test_an_svg_has_the_colours_of_the_page_and_its_size() -> None:
 def test_the_numbers_of_a_figure_have_the_group_after_each_participant(
     groups: list[str | None], columns: list[str], lines: list[str]
 ) -> None:
-    made = made_up.study(made_up.liquids(1), [(who, 1, "L1", (4, 4)) for who in "AB"])
-    made = replace(made, participants=made.participants.assign(group=groups))
+    case_study = made_up.study(made_up.liquids(1), [(who, 1, "L1", (4, 4)) for who in "AB"])
+    case_study = replace(case_study, participants=case_study.participants.assign(group=groups))
     rows = pd.DataFrame({"code": ["L1", "L2"], "participant": ["B", "A"], "group": ["x", "y"], "value": [5, 7]})
-    assert page_layout.tab_separated(made, rows[columns]).replace("\t", " ").splitlines() == lines
+    assert page_layout.tab_separated(case_study, rows[columns]).replace("\t", " ").splitlines() == lines
 
 
 @pytest.mark.parametrize(
@@ -232,7 +230,7 @@ def test_the_numbers_of_a_figure_have_the_group_after_each_participant(
         ("", "experts", [("Only experts", style.SEALED, style.SEALED_GROUND)]),
     ],
 )
-def test_figures_are_marked_with_what_limits_their_meaning(
+def test_figures_carry_marks_that_limit_their_interpretation(
     shown: str, split: str, marks: list[tuple[str, str, str]]
 ) -> None:
     study = made_up.study(made_up.liquids(1), [("A", 1, "L1", (4, 4))])
@@ -243,17 +241,19 @@ def test_figures_are_marked_with_what_limits_their_meaning(
 
 
 def test_a_picture_has_its_own_title_participants_and_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = replace(made_up.study(made_up.liquids(1), [(who, 1, "L1", (4, 4)) for who in "ABC"]), name="oils")
-    monkeypatch.setattr(style, "file_bytes", lambda *given: given)
+    picture_study = replace(made_up.study(made_up.liquids(1), [(who, 1, "L1", (4, 4)) for who in "ABC"]), name="oils")
+    monkeypatch.setattr(style, "file_bytes", lambda *arguments: arguments)
 
     def draw(look: Look) -> Any:
         return SimpleNamespace(figure=look)
 
-    for counts, told in ((None, ("three participants",)), (["n = 2"], ["n = 2"])):
-        drawn = page_layout.picture_of(made, "b", "file", "Title", "Caption.", draw, ("svg", "pdf"), counts, "1")
-        look = Look("Title", study_marks(made), told, style.fonts())
+    for counts, expected_words in ((None, ("three participants",)), (["n = 2"], ["n = 2"])):
+        picture = page_layout.picture_of(
+            picture_study, "b", "file", "Title", "Caption.", draw, ("svg", "pdf"), counts, "1"
+        )
+        look = Look("Title", study_marks(picture_study), expected_words, style.fonts())
         files: Any = {form: (look, form, "oils: Title") for form in ("svg", "pdf")}
-        assert drawn == Picture(block="b", name="file", caption="Caption.", files=files, title="Title", numbers="1")
+        assert picture == Picture(block="b", name="file", caption="Caption.", files=files, title="Title", numbers="1")
 
 
 def test_measures_of_reaches_have_a_scale_each() -> None:

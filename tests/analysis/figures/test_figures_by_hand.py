@@ -24,6 +24,8 @@ from study_app.analysis.page_layout import Drawing, Look
 from study_app.analysis.results import ContrastResult, ContrastSide, GroupAnswers, LevelsResult, QuestionResult
 from study_app.analysis.statistics.outcome import Interval
 from study_app.protocol.model import Contrast, Published
+from study_app.protocol.questions import Number
+from study_app.store.verification import Discrepancy
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 
 LOOK = Look("Title", [], ["n = 3"], style.FALLBACK_FONTS)
@@ -37,7 +39,7 @@ class Shown(SimpleNamespace):
 
 
 @pytest.fixture
-def shown(monkeypatch: pytest.MonkeyPatch) -> list[Shown]:
+def people_figures_drawn(monkeypatch: pytest.MonkeyPatch) -> list[Shown]:
     """Return the figures of people that are drawn during the test."""
     figures: list[Shown] = []
     names = ("study", "block", "name", "title", "caption", "panels", "forms")
@@ -55,8 +57,8 @@ def values_of(*values: float) -> dict[str, float]:
 
 
 def side(name: str, *values: float, mean: float, people: Sequence[str] = PEOPLE) -> ContrastSide:
-    held = dict(zip(people, values, strict=True))
-    return ContrastSide(name=name, values=held, mean=mean, low=mean / 2, high=2 * mean, sd=1.0)
+    values_of = dict(zip(people, values, strict=True))
+    return ContrastSide(name=name, values=values_of, mean=mean, low=mean / 2, high=2 * mean, sd=1.0)
 
 
 def hypothesis(sides: tuple[ContrastSide, ...], *, ratio: bool = False, **stated: Any) -> ContrastResult:
@@ -93,12 +95,14 @@ def results_of(*contrasts: ContrastResult, levels: Sequence[LevelsResult] = ()) 
     return SimpleNamespace(contrasts=contrasts, levels=levels)
 
 
-def test_a_hypothesis_within_participants_has_both_values_and_their_difference(shown: list[Shown]) -> None:
+def test_a_hypothesis_within_participants_has_both_values_and_their_difference(
+    people_figures_drawn: list[Shown],
+) -> None:
     first, second = side("Wax", 5.0, 3.0, 7.0, mean=5.0), side("Oil", 4.0, 4.5, 1.0, mean=3.5)
     stated = {"measure": "warm", "blocks": ("b",), "conditions": ("c1", "c2"), "bound": 1.5}
     nobody = hypothesis((side("Wax", mean=1.0, people=()),) * 2, **stated)
     assert draw(results_of(nobody, hypothesis((first, second), **stated))) == [("b", "hypothesis-2")]
-    (figure,) = shown
+    (figure,) = people_figures_drawn
     assert (figure.block, figure.name, figure.title, figure.forms) == ("b", "hypothesis-2", "Warmth", ("svg",))
     assert (figure.above, figure.caption) == (
         "Points on the scale",
@@ -116,7 +120,7 @@ def test_a_hypothesis_within_participants_has_both_values_and_their_difference(s
     assert (difference.joined, difference.line, difference.bound, difference.log) == (False, 0.0, (-1.5, 1.5), False)
 
 
-def test_a_ratio_of_thresholds_is_logarithmic_with_the_unit_of_its_block(shown: list[Shown]) -> None:
+def test_a_ratio_of_thresholds_is_logarithmic_with_the_unit_of_its_block(people_figures_drawn: list[Shown]) -> None:
     sides = side("Late", 4.0, 9.0, 2.0, mean=4.0), side("Prompt", 2.0, 3.0, 8.0, mean=2.0)
     level = LevelsResult(
         block="late", title="Late", design="d", revealed=True, times=(), summary="share", counts="correct",
@@ -125,7 +129,7 @@ def test_a_ratio_of_thresholds_is_logarithmic_with_the_unit_of_its_block(shown: 
     other = replace(level, block="prompt", quantity="mass", unit="kg")
     stated = {"measure": "threshold", "blocks": ("late", "prompt"), "bound": 1.25}
     draw(results_of(hypothesis(sides, ratio=True, **stated), levels=(other, level)))
-    (figure,) = shown
+    (figure,) = people_figures_drawn
     assert (figure.block, figure.above) == ("late", "Damping at the hand [N·s/m]")
     assert "Right: First ÷ Second, for" in figure.caption
     assert "Band: equivalence bounds. Means are weighted as in the test. Three" in figure.caption
@@ -134,7 +138,7 @@ def test_a_ratio_of_thresholds_is_logarithmic_with_the_unit_of_its_block(shown: 
     assert (values.log, ratio.log, ratio.line, ratio.bound) == (True, True, 1.0, (0.8, 1.25))
 
 
-def test_an_interaction_has_each_group_under_each_condition(shown: list[Shown]) -> None:
+def test_an_interaction_has_each_group_under_each_condition(people_figures_drawn: list[Shown]) -> None:
     old, new = PEOPLE[:2], PEOPLE[2:]
     sides = side("old", 1.0, 2.0, mean=1.5, people=old), side("new", 6.0, mean=6.0, people=new)
     cells = (
@@ -144,7 +148,7 @@ def test_an_interaction_has_each_group_under_each_condition(shown: list[Shown]) 
     stated = {"measure": "d_prime", "blocks": ("b", "c"), "groups": ("old", "new")}
     crossed = replace(hypothesis(sides, **stated), cells=cells, compared=("old", "new"))
     draw(results_of(crossed))
-    (figure,) = shown
+    (figure,) = people_figures_drawn
     assert (
         "Left: each group under each condition. Each line connects a participant's two values. Middle" in figure.caption
     )
@@ -179,7 +183,7 @@ THRESHOLDS = LevelsResult(
 )  # fmt: skip
 
 
-def test_estimates_are_above_their_standards_with_the_means_of_the_group(shown: list[Shown]) -> None:
+def test_estimates_are_above_their_standards_with_the_means_of_the_group(people_figures_drawn: list[Shown]) -> None:
     """P9 is not included."""
     rows = (
         threshold("P000", 40.0, 2.0), threshold("P001", 40.0, 3.0), threshold("P9", 40.0, 99.0),
@@ -191,7 +195,7 @@ def test_estimates_are_above_their_standards_with_the_means_of_the_group(shown: 
     alone = tuple(row for row in rows if row.standard == 40.0)
     linear = replace(THRESHOLDS, statistics={"thresholds": alone}, spacing="linear")
     draw(results_of(levels=(linear,)))
-    both, single = shown
+    both, single = people_figures_drawn
     (panel,) = both.panels
     assert columns_of(panel) == [
         ("8", {"P000": 0.5}, (0.6, 0.3, 1.2), ""), ("40", {"P000": 2.0, "P001": 3.0}, (2.5, 1.25, 5.0), ""),
@@ -211,7 +215,7 @@ def test_estimates_are_above_their_standards_with_the_means_of_the_group(shown: 
 
 
 def test_scores_and_numeric_answers_have_their_scale_and_the_order_of_the_hypothesis(
-    shown: list[Shown], monkeypatch: pytest.MonkeyPatch
+    people_figures_drawn: list[Shown], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each answer of P001 about wax counts half; a questionnaire with scores shows these alone."""
 
@@ -222,7 +226,8 @@ def test_scores_and_numeric_answers_have_their_scale_and_the_order_of_the_hypoth
         )
 
     def question(item: str, of: Any, bounds: Any = (1, 9)) -> Any:
-        return SimpleNamespace(id=item, short=item.capitalize(), where=of, bounds=bounds, scale_ends=bounds and (1, 7))
+        values = {"id": item, "short": item.capitalize(), "where": of, "bounds": bounds, "unit": f"{item} unit"}
+        return SimpleNamespace(**values, scale_ends=bounds and (1, 7))
 
     load, end, pitch = place("load", "L1", "L2"), place("end"), place("pitch")
     questions = (
@@ -235,26 +240,26 @@ def test_scores_and_numeric_answers_have_their_scale_and_the_order_of_the_hypoth
         columns=["participant", "code", "value"],
     )
     empty = rows.assign(value=np.nan)
-    monkeypatch.setattr(Study, "answers_to", lambda _study, asked: empty if asked.id == "empty" else rows)
+    monkeypatch.setattr(Study, "answers_to", lambda _study, question: empty if question.id == "empty" else rows)
     monkeypatch.setattr(summary_figures, "scored", lambda *_: rows.rename(columns={"value": "score"}))
     others: Any = SimpleNamespace(questions=questions, scores=(score,))
     levels: Any = (SimpleNamespace(id="pitch"),)
-    made = replace(MADE, others=others, levels=levels)
+    case_study = replace(MADE, others=others, levels=levels)
     of_l1, of_l2 = ("Name L1", {"P000": 3.0}), ("Name L2", {"P001": 6.5})
-    age = Numbers("Age", (1, 7), False, (("", {"P000": 3.0, "P001": 6.5}),), "age", ())
-    numbers = numbers_of(made)
+    age = Numbers("Age", (1, 7), False, (("", {"P000": 3.0, "P001": 6.5}),), "age", (), (), "age unit")
+    numbers = numbers_of(case_study)
     raw = Numbers("Raw", (0.0, 100.0), True, (of_l1, of_l2), "raw", ("L1", "L2"), ("cL1", "cL2"))
     assert numbers == {"load": [raw], "end": [age]}
     reverse: Any = (SimpleNamespace(within=("cL2", "cL1")),)
-    (score_of_hypothesis,) = numbers_of(replace(made, contrasts=reverse))["load"]
+    (score_of_hypothesis,) = numbers_of(replace(case_study, contrasts=reverse))["load"]
     assert (score_of_hypothesis.by_setting, score_of_hypothesis.codes) == ((of_l2, of_l1), ("L2", "L1"))
     ten = [age._replace(title=f"Age {place}") for place in range(10)]
-    assert draw(results_of(), {"end": ten, "load": numbers["load"]}, made) == [
+    assert draw(results_of(), {"end": ten, "load": numbers["load"]}, case_study) == [
         ("end", "answers-end"),
         ("load", "answers-load"),
     ]
-    of_end, of_load = shown
-    assert [panel.title for panel in of_end.panels] == [f"Age {place}" for place in range(9)]
+    of_end, of_load = people_figures_drawn
+    assert [panel.title for panel in of_end.panels] == [f"Age {place} (age unit)" for place in range(9)]
     assert (of_end.title, of_end.above) == ("Title end", "")
     assert of_end.caption == (
         "Title end: the value for each participant, and the mean with its 95 % confidence interval (Student's t). Two "
@@ -269,23 +274,23 @@ def test_scores_and_numeric_answers_have_their_scale_and_the_order_of_the_hypoth
 
 @pytest.mark.parametrize("over_delay", [True, False])
 def test_the_figure_of_a_block_has_differences_over_delay_and_answers_about_liquids(
-    over_delay: bool, shown: list[Shown]
+    over_delay: bool, people_figures_drawn: list[Shown]
 ) -> None:
     """Participant 1 gives one point more than participant 0, and each further setting has two points more."""
     settings = delays((0, 40, 90)) if over_delay else liquids(3)
     points = {item: place for place, item in enumerate(ITEMS)}
     answers = everybody(settings, 2, lambda person, _s, code, item: person + 2 * int(code[1:]) * (1 - points[item]))
-    made = study(settings, list(answers), replace(DECIDED, alpha=0.05, equivalence_bound=0.5))
-    (block,) = made.blocks
+    case_study = study(settings, list(answers), replace(DECIDED, alpha=0.05, equivalence_bound=0.5))
+    (block,) = case_study.blocks
     block = replace(block, labels=("not at all", *"23456", "fully"))
     names = tuple(f"Name {setting.code}" for setting in settings)
     result: Any = SimpleNamespace(
         id="b", title="Block", kind=block.kind, revealed=True, n=2, settings=settings, names=names, items=block.items,
         delays_ms=(0.0, 40.0, 90.0) if over_delay else (), findings={"effects": (1,)},
     )  # fmt: skip
-    results: Any = SimpleNamespace(decided=made.decided)
-    Effects(result, results).figure(Drawing(made, block, result, results, "effects-b", ("svg",)))
-    (figure,) = shown
+    results: Any = SimpleNamespace(decided=case_study.decided)
+    Effects(result, results).figure(Drawing(case_study, block, result, results, "effects-b", ("svg",)))
+    (figure,) = people_figures_drawn
     first, second = figure.panels
     assert (first.title, second.title, figure.shared) == ("Different", "Harder", True)
     if over_delay:
@@ -317,10 +322,10 @@ def question(measure: str, *groups: tuple[str, dict[str, Any]]) -> QuestionResul
     )  # fmt: skip
 
 
-def asked(levels: dict[str, str], bounds: Any = None, low: str = "", high: str = "") -> Any:
+def question_of_levels(levels: dict[str, str], bounds: Any = None, low: str = "", high: str = "") -> Any:
     view = SimpleNamespace(low=low, high=high)
     kind = SimpleNamespace(view=lambda _number, _context: view)
-    return SimpleNamespace(id="it", levels=levels, bounds=bounds, question=kind, context=None)
+    return SimpleNamespace(id="it", levels=levels, bounds=bounds, question=kind, context=None, unit="")
 
 
 def texts_of(figure: Figure) -> list[str]:
@@ -332,7 +337,7 @@ def test_a_distribution_has_each_answer_the_quartiles_and_the_ends_of_the_scale(
     numbers = {"n": 4, "values": [2.0, 3.0, 5.0, 9.0], "median": 4.0, "q1": 2.5, "q3": 7.0}
     nothing = {"n": 0, "values": [], "median": None, "q1": None, "q3": None}
     result = question("distribution", ("Wax", nothing), ("Oil", numbers))
-    figure = question_figures.draw_distribution(asked({}, (0, 10), "dull", "sharp"), result, LOOK).figure
+    figure = question_figures.draw_distribution(question_of_levels({}, (0, 10), "dull", "sharp"), result, LOOK).figure
     (axes,) = figure.axes
     points = {line.get_gid(): line for line in axes.lines if line.get_gid() in ("W", "O")}
     assert list(points) == ["O"]
@@ -344,25 +349,49 @@ def test_a_distribution_has_each_answer_the_quartiles_and_the_ends_of_the_scale(
     assert axes.get_xlim() == pytest.approx((-0.3, 10.3))
     texts = [text for text in texts_of(figure) if text not in ("Title", "n = 3")]
     assert texts[-6:] == ["Wax", "n = 0", "Oil", "n = 4", "0 dull", "10 sharp"]
-    unbounded = question_figures.draw_distribution(asked({}), question("distribution", ("Oil", numbers)), LOOK).figure
+    unbounded = question_figures.draw_distribution(
+        question_of_levels({}), question("distribution", ("Oil", numbers)), LOOK
+    ).figure
     assert {"2", "9"} <= {*texts_of(unbounded)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("values", "ends", "labels"),
+    [
+        ((0.5, 8.0, 90.0, 4000.0), (-1.0, 4.0), ["1", "10", "100", "1000", "0.1 Pa", "10000 Pa"]),
+        ((20.0, 30.0, 30.0, 60.0), (20.0, 60.0), ["20 Pa", "60 Pa"]),
+        ((0.0, 8.0, 90.0, 90000.0), (0.001, 100000.0), ["0.001 Pa", "100000 Pa"]),
+    ],
+)
+def test_the_axis_of_numbers_shows_the_range_of_the_answers(
+    values: tuple[float, ...], ends: tuple[float, float], labels: list[str]
+) -> None:
+    numbers = {"n": 4, "values": list(values), "median": values[1], "q1": values[1], "q3": values[2]}
+    number = Number(id="it", text="?", short="It", least=0.001, most=100000)
+    placed = question_of_levels({}, (0.001, 100000.0))
+    placed.question, placed.unit, placed.context = number, "Pa", SimpleNamespace(text=str)
+    figure = question_figures.draw_distribution(placed, question("distribution", ("Oil", numbers)), LOOK).figure
+    margin = 0.03 * (ends[1] - ends[0])
+    assert figure.axes[0].get_xlim() == pytest.approx((ends[0] - margin, ends[1] + margin))
+    assert texts_of(figure)[-len(labels) :] == labels
 
 
 @pytest.mark.slow
 def test_options_have_a_bar_for_those_who_chose_them_beside_one_for_those_who_answered() -> None:
     groups = ("Wax", {"n": 9, "counts": {"y": 7, "n": 2}}), ("Oil", {"n": 6, "counts": {"y": 1, "n": 5}})
     levels = {"y": "Yes", "n": "No"}
-    figure = question_figures.draw_options(asked(levels), question("counts", *groups), LOOK).figure
+    figure = question_figures.draw_options(question_of_levels(levels), question("counts", *groups), LOOK).figure
     (axes,) = figure.axes
     bars = [(bar.get_y() + bar.get_height() / 2, bar.get_width(), str(bar.get_gid())) for bar in axes.patches]
-    chosen = [(y, width) for y, width, name in bars if name.startswith("bar-")]
-    answered = [(y, width) for y, width, name in bars if not name.startswith("bar-")]
-    assert chosen == [(pytest.approx(y), width) for y, width in enumerate((7, 2, 1, 5))]
-    assert answered == [(pytest.approx(y), width) for y, width in enumerate((9, 9, 6, 6))]
+    option_bars = [(y, width) for y, width, name in bars if name.startswith("bar-")]
+    answered_bars = [(y, width) for y, width, name in bars if not name.startswith("bar-")]
+    assert option_bars == [(pytest.approx(y), width) for y, width in enumerate((7, 2, 1, 5))]
+    assert answered_bars == [(pytest.approx(y), width) for y, width in enumerate((9, 9, 6, 6))]
     assert [text.get_text() for text in axes.texts] == ["7", "2", "1", "5"]
     names = ["Wax: Yes", "Wax: No", "Oil: Yes", "Oil: No"]
     assert [text for text in texts_of(figure) if text in names] == names
-    single = question_figures.draw_options(asked(levels), question("counts", groups[0]), LOOK).figure
+    single = question_figures.draw_options(question_of_levels(levels), question("counts", groups[0]), LOOK).figure
     assert {"Yes", "No"} <= {*texts_of(single)}
 
 
@@ -373,7 +402,7 @@ def test_ratings_have_a_segment_for_each_point_in_the_colour_of_the_legend() -> 
         ("Oil", {"n": 0, "counts": dict.fromkeys("123", 0)}),
     )
     levels = {"1": "never", "2": "often", "3": "always"}
-    figure = question_figures.draw_ratings(asked(levels), question("rating", *groups), LOOK).figure
+    figure = question_figures.draw_ratings(question_of_levels(levels), question("rating", *groups), LOOK).figure
     (axes,) = figure.axes
     segments = [(bar.get_x(), bar.get_width()) for bar in axes.patches if bar.get_gid() == "W"]
     assert segments == [pytest.approx(pair) for pair in ((0.0, 0.2), (0.2, 0.5), (0.7, 0.3))]
@@ -391,7 +420,7 @@ def test_each_answered_question_has_its_figure_caption_and_table(monkeypatch: py
         {"participant": ["P1", "P2"], "session": [1, 2], "code": [None, None], "response": ["7", "3"], "trial": [8, 9]}
     )
     monkeypatch.setattr(Study, "answers_to", lambda *_: rows)
-    monkeypatch.setattr(question_figures, "picture_of", lambda *given, numbers: (*given, numbers))
+    monkeypatch.setattr(question_figures, "picture_of", lambda *arguments, numbers: (*arguments, numbers))
     numbers = {"n": 2, "participants": 2, "counts": {"3": 1, "7": 1}}
     asked_questions = [
         question("rating", ("All", numbers)),
@@ -400,15 +429,15 @@ def test_each_answered_question_has_its_figure_caption_and_table(monkeypatch: py
         replace(question("texts", ("All", numbers)), figure=None, item="why"),
         replace(question("distribution", ("All", numbers)), where="late", short="End", item="age"),
     ]
-    placed = [asked({"3": "low", "7": "high"}) for _ in asked_questions]
+    placed = [question_of_levels({"3": "low", "7": "high"}) for _ in asked_questions]
     levels: Any = [
         SimpleNamespace(id="pitch", design=SimpleNamespace(adjusts=False)),
         SimpleNamespace(id="x", design=SimpleNamespace(adjusts=True)),
     ]
-    made = replace(MADE, others=SimpleNamespace(questions=placed), levels=levels)  # type: ignore[arg-type]
-    tasks = list(question_figures.question_figure_tasks(made, asked_questions, ("svg",)))
+    case_study = replace(MADE, others=SimpleNamespace(questions=placed), levels=levels)  # type: ignore[arg-type]
+    tasks = list(question_figures.question_figure_tasks(case_study, asked_questions, ("svg",)))
     assert [(of, name) for of, name, _ in tasks] == [("end", "question-end-it"), ("late", "question-late-age")]
-    sealed = replace(made, settings={})
+    sealed = replace(case_study, settings={})
     assert [of for of, *_ in question_figures.question_figure_tasks(sealed, asked_questions)] == [
         "end",
         "pitch",
@@ -417,7 +446,7 @@ def test_each_answered_question_has_its_figure_caption_and_table(monkeypatch: py
     (study_drawn, *names, title, caption, _, forms, table), (*_, other_title, _, _, _, _) = (
         draw_task() for *_, draw_task in tasks
     )
-    assert (study_drawn is made, names, forms) == (True, ["end", "question-end-it"], ("svg",))
+    assert (study_drawn is case_study, names, forms) == (True, ["end", "question-end-it"], ("svg",))
     assert (title, other_title) == ("End: It", "End")
     assert caption == (
         "End: “How?” Each bar shows the proportion of answers at each point of the scale; labels show the number of "
@@ -430,7 +459,7 @@ def test_each_answered_question_has_its_figure_caption_and_table(monkeypatch: py
     ("n", "sentence"),
     [
         (9, "Bars show the number of participants who chose each option; grey bars show the number who answered."),
-        (14, "Bars show the number of answers with each option; grey bars show the total number of answers."),
+        (14, "Bars show how often each option was chosen; grey bars show the total number of answers."),
     ],
 )
 def test_bars_show_answers_if_participants_answered_more_than_once(
@@ -439,17 +468,17 @@ def test_bars_show_answers_if_participants_answered_more_than_once(
     monkeypatch.setattr(
         Study, "answers_to", lambda *_: pd.DataFrame(columns=["participant", "session", "code", "response"])
     )
-    monkeypatch.setattr(question_figures, "picture_of", lambda *given, **_: given[4])
+    monkeypatch.setattr(question_figures, "picture_of", lambda *arguments, **_: arguments[4])
     numbers = {"n": n, "participants": 9, "counts": {"3": 5, "7": n - 5}}
-    placed: Any = SimpleNamespace(questions=[asked({"3": "low", "7": "high"})])
-    made = replace(MADE, others=placed, levels=())
-    ((*_, draw_task),) = question_figures.question_figure_tasks(made, [question("counts", ("All", numbers))])
+    placed: Any = SimpleNamespace(questions=[question_of_levels({"3": "low", "7": "high"})])
+    case_study = replace(MADE, others=placed, levels=())
+    ((*_, draw_task),) = question_figures.question_figure_tasks(case_study, [question("counts", ("All", numbers))])
     assert draw_task() == f"End: “How?” {sentence} {SAMPLE}"
 
 
 def answers_at(person: str | None, level: float, value: float, **changes: Any) -> LevelAnswers:
-    held = {"standard": 40.0, "comparison": None, "n": 8, "participants": 2, "count": None, "low": None, "high": None}
-    return LevelAnswers(participant=person, level=level, value=value, **{**held, **changes})
+    fields = {"standard": 40.0, "comparison": None, "n": 8, "participants": 2, "count": None, "low": None, "high": None}
+    return LevelAnswers(participant=person, level=level, value=value, **{**fields, **changes})
 
 
 def test_weber_fractions_are_thresholds_over_standards_at_the_published_percentage() -> None:
@@ -494,11 +523,11 @@ def test_the_panels_of_levels_show_all_and_then_each_participant() -> None:
     figure = level_figures._draw_levels(ratings, {}, LOOK).figure
     assert {"Mean rating", "Frequency [Hz]"} <= {*texts_of(figure)}
     assert [text for text in texts_of(figure) if text in ("All", *PEOPLE)] == ["All", "P000", "P001"]
-    drawn = [
+    panel_lines = [
         [np.asarray(line.get_ydata()).tolist() for line in axes.lines if len(line.get_ydata()) == 2]
         for axes in figure.axes
     ]
-    of_all, of_first, of_second = drawn
+    of_all, of_first, of_second = panel_lines
     assert of_all == [[4.0, 5.0], [2.0, 7.0], [3.0, 6.0], [2.5, 3.5]]
     assert of_first == [[4.0, 5.0], [3.0, 5.5]]
     assert of_second == [[2.0, 7.0]]
@@ -513,8 +542,8 @@ def test_the_panels_of_levels_show_all_and_then_each_participant() -> None:
     assert crosses == [[], [[1.0]], []]
 
 
-def test_the_caption_of_levels_says_what_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(level_figures, "picture_of", lambda _study, *given: given)
+def test_the_caption_of_levels_describes_the_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(level_figures, "picture_of", lambda _study, *arguments: arguments)
     monkeypatch.setattr(level_figures, "_psychometric_bands", lambda *_: {})
     answers = tuple(answers_at(person, 2.0, 0.5) for person in PEOPLE[:2])
     shares = replace(THRESHOLDS, statistics={"answers": answers})
@@ -546,38 +575,45 @@ def test_the_caption_of_levels_says_what_is_drawn(monkeypatch: pytest.MonkeyPatc
 LABELS = ("not at all", *"23456", "fully")
 
 
-def answered(*, is_open: bool = True, over_delay: bool = False) -> Study:
-    """Return answers of three participants: P002 was not asked about the last setting, and one answer is missing."""
+def study_of_answers(*, is_open: bool = True, over_delay: bool = False) -> Study:
+    """Return answers of three participants: P002 did not rate the last setting, and one answer is missing."""
     settings = delays((0, 40)) if over_delay else liquids(2)
-    given = {"P000": ((1, 4), (7, 4)), "P001": ((2, 5), (6, None)), "P002": ((4, 6),)}
+    answers_of = {"P000": ((1, 4), (7, 4)), "P001": ((2, 5), (6, None)), "P002": ((4, 6),)}
     rows = [
         (person, 1, setting.code, values)
-        for person, of_person in given.items()
+        for person, of_person in answers_of.items()
         for setting, values in zip(settings, of_person, strict=False)
     ]
-    made = study(settings, rows)
+    case_study = study(settings, rows)
     if not is_open:
         settings = tuple(replace(setting, condition=None, liquid=None, delay_ms=None) for setting in settings)
-    block = replace(made.blocks[0], labels=LABELS, settings=settings)
-    responses = made.responses.assign(response=made.responses["response"].astype("Int64"))
+    block = replace(case_study.blocks[0], labels=LABELS, settings=settings)
+    responses = case_study.responses.assign(response=case_study.responses["response"].astype("Int64"))
     valid = pd.array([True, False, None, True, False], "boolean")
-    trials = made.trials.assign(delay_error_mean_ms=[-2.0, 1.0, 0.5, 3.0, -0.5], valid=valid)
+    trials = case_study.trials.assign(delay_error_mean_ms=[-2.0, 1.0, 0.5, 3.0, -0.5], valid=valid)
     trials = pd.concat([trials, trials.assign(block="c", valid=False, delay_error_mean_ms=9.0)])
-    return replace(made, blocks=(block,), responses=responses, trials=trials, settings=made.settings if is_open else {})
+    return replace(
+        case_study, blocks=(block,), responses=responses, trials=trials, settings=case_study.settings if is_open else {}
+    )
 
 
 def test_the_caption_of_answers_counts_participants_missing_answers_exclusions_and_limits() -> None:
-    made = answered()
-    (block,) = made.blocks
-    assert answer_figures.counts(made, block) == [
+    answered_study = study_of_answers()
+    (block,) = answered_study.blocks
+    assert answer_figures.counts(answered_study, block) == [
         "n = 2 to 3 of 3 participants per liquid, 1 of 10 ratings missing", "n = 2 to 3, 1 of 10 ratings missing",
     ]  # fmt: skip
-    people = made.participants
+    people = answered_study.participants
     extra = [people.iloc[[place]].assign(participant=f"P{place}9") for place in (0, 1, 2)]
     extra = [extra[0].assign(counted=False), *(row.assign(counted=False, excluded=True) for row in extra[1:])]
-    doubts: Any = [SimpleNamespace(path=made.folder / f"{name}.csv", what="differs") for name in "dacbd"]
-    shown = replace(made, participants=pd.concat([people.assign(pilot=True), *extra]), doubts=tuple(doubts))
-    caption = answer_figures._caption(shown, block)
+    doubts = [
+        Discrepancy(answered_study.folder / f"{name}.csv", "differs", "verify", used=name != "e") for name in "dacbde"
+    ]
+    damaged = people.iloc[[0]].assign(participant="P39", status="damaged", counted=False)
+    limited_study = replace(
+        answered_study, participants=pd.concat([people.assign(pilot=True), *extra, damaged]), doubts=tuple(doubts)
+    )
+    caption = answer_figures._caption(limited_study, block)
     assert caption.startswith(
         "Pilot. Agreement with 2 statements about 2 liquids (simulated participants, not people; n = 2 to 3 of 3 "
         "participants per liquid, 1 of 10 ratings missing). Bars show the number of answers, with disagreement to the "
@@ -585,11 +621,11 @@ def test_the_caption_of_answers_counts_participants_missing_answers_exclusions_a
     )
     assert caption.endswith(
         "The scale points from 1 to 7 are: not at all, 2, 3, 4, 5, 6, fully. “Cannot judge” answers: 0; missing "
-        "answers: 1. 1 session is excluded because it was not completed. 2 sessions are excluded. 2 of 5 trials "
-        "exceeded the protocol's limits but are included. 4 files are used although they have changed since recording: "
-        "a.csv, b.csv, c.csv and 1 more."
+        "answers: 1. 1 session is excluded because it was not completed. 1 damaged session is not included. 2 "
+        "sessions are excluded. 2 of 5 trials exceeded the protocol's limits but are included. 4 files are used "
+        "although they have changed since recording: a.csv, b.csv, c.csv and 1 more."
     )
-    late = answered(over_delay=True)
+    late = study_of_answers(over_delay=True)
     caption = answer_figures._caption(late, late.blocks[0])
     assert "about 2 delays (simulated" in caption
     assert "Thin lines: participants, shifted slightly" in caption
@@ -598,11 +634,11 @@ def test_the_caption_of_answers_counts_participants_missing_answers_exclusions_a
         in caption
     )
     assert "differed from it by +0.4 ms on average (range across trials: −2.0 to +3.0 ms)." in caption
-    sealed = answered(is_open=False)
+    sealed = study_of_answers(is_open=False)
     caption = answer_figures._caption(sealed, sealed.blocks[0])
     assert "about 2 conditions (" in caption
     assert "Conditions appear as codes because the study is blinded; their order has no meaning." in caption
-    blocks = made.blocks[0], late.blocks[0], sealed.blocks[0]
+    blocks = answered_study.blocks[0], late.blocks[0], sealed.blocks[0]
     assert [answer_figures.title(shown_block) for shown_block in blocks] == [
         "Agreement for each liquid", "Answers as a function of added delay", "Agreement by condition",
     ]  # fmt: skip
@@ -610,9 +646,9 @@ def test_the_caption_of_answers_counts_participants_missing_answers_exclusions_a
 
 @pytest.mark.slow
 def test_bars_have_the_answers_of_each_level_and_n_where_some_are_missing() -> None:
-    """The second statement about the second liquid has one answer less."""
-    made = answered()
-    figure = answer_figures.draw_block(made, made.blocks[0], {}, LOOK).figure
+    """One answer to the second statement about the second liquid is missing."""
+    answered_study = study_of_answers()
+    figure = answer_figures.draw_block(answered_study, answered_study.blocks[0], {}, LOOK).figure
     first, second = figure.axes
     bars = [
         {str(bar.get_gid()): (bar.get_x(), bar.get_width()) for bar in axes.patches if bar.get_gid()}
@@ -626,15 +662,15 @@ def test_bars_have_the_answers_of_each_level_and_n_where_some_are_missing() -> N
     assert bars[1] == {"L2-row1-level6": (0.0, 1), "L2-row1-level7": (1.0, 1), "L2-row2-level4": (edge, 1)}
     texts = texts_of(figure)
     assert [text for text in texts if text in ("n 1", "n 2", "n 3")] == ["n 1"]
-    names = [made.blocks[0].name(setting) for setting in made.blocks[0].settings]
+    names = [answered_study.blocks[0].name(setting) for setting in answered_study.blocks[0].settings]
     assert [text for text in texts if text in names] == names
     assert [text for text in texts if text in ("Different", "Harder")] == ["Different", "Harder"]
 
 
 @pytest.mark.slow
 def test_answers_over_delay_have_a_plot_for_each_statement_with_its_lowest_delay() -> None:
-    made = answered(over_delay=True)
-    figure = answer_figures.draw_block(made, made.blocks[0], {"harder": 40.0}, LOOK).figure
+    answered_study = study_of_answers(over_delay=True)
+    figure = answer_figures.draw_block(answered_study, answered_study.blocks[0], {"harder": 40.0}, LOOK).figure
     first, second = figure.axes
     assert [text for text in texts_of(figure) if text in ("Different", "Harder")] == ["Different", "Harder"]
     assert "Added delay in ms.   1 = not at all, 7 = fully." in texts_of(figure)
@@ -651,15 +687,17 @@ def test_the_labels_of_a_legend_are_shortened_by_the_ending_that_they_share() ->
         "Mostly disagree",
         "Rather disagree",
         "Neither",
-        "Rather agree",
-        "Mostly agree",
-        "Fully agree",
+        "Fairly well",
+        "Quite well",
+        "Very well",
     )
     assert answer_figures._legend_labels(agree) == [
-        "Fully disagree", "Mostly", "Rather", "Neither", "Rather", "Mostly", "Fully agree",
+        "Fully disagree", "Mostly", "Rather", "Neither", "Fairly", "Quite", "Very well",
     ]  # fmt: skip
     same = ("A b", "C b", "C b", "n", "d e", "f e", "g e")
     assert answer_figures._legend_labels(same) == list(same)
+    both_sides = ("Fully disagree", "Disagree", "Rather disagree", "Neither", "Rather agree", "Agree", "Fully agree")
+    assert answer_figures._legend_labels(both_sides) == list(both_sides)
 
 
 @pytest.mark.slow
@@ -684,14 +722,14 @@ def test_the_matrix_of_names_has_the_counts_and_outlines_the_correct_one() -> No
 
 
 def course(person: str, standard: float, **changes: Any) -> TrackCourse:
-    """Return six trials of two tracks: the third is a catch trial, the fifth presents the standard alone."""
-    held = {
+    """Return six trials of two tracks: the third is a catch trial, the fifth presents only the standard."""
+    fields = {
         "tracks": np.array([1, 2, 1, 1, 2, 2]), "levels": np.array([4.0, 8.0, 2.0, 5.0, 6.0, 3.0]),
         "successes": np.array([1, 0, 1, 0, 1, 1], bool), "reversals": np.array([0, 0, 0, 1, 0, 0], bool),
         "catches": np.array([0, 0, 1, 0, 0, 0], bool), "noises": np.array([0, 0, 0, 0, 1, 0], bool),
         "low": np.linspace(1, 2, 6), "high": np.linspace(9, 4, 6),
     }  # fmt: skip
-    return TrackCourse(participant=person, standard=standard, **{**held, **changes})
+    return TrackCourse(participant=person, standard=standard, **{**fields, **changes})
 
 
 @pytest.mark.slow
@@ -721,19 +759,21 @@ def test_tracks_have_a_line_for_each_track_and_a_mark_for_each_answer() -> None:
     assert not [text for text in texts_of(alone) if text.startswith("standard")]
 
 
-def test_the_caption_of_tracks_says_which_marks_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(level_figures, "picture_of", lambda _study, *given: given)
+def test_the_caption_of_tracks_lists_the_marks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(level_figures, "picture_of", lambda _study, *arguments: arguments)
     none = np.zeros(6, bool)
     plain = course("P000", 40.0, tracks=np.ones(6, int), reversals=none, catches=none)
     answers = tuple(answers_at(person, 2.0, 0.5) for person in PEOPLE)
     rows = tuple(threshold(person, 40.0, 2.0) for person in PEOPLE)
     result = replace(THRESHOLDS, statistics={"answers": answers, "thresholds": rows}, adaptive=True)
-    made = replace(MADE, levels=(SimpleNamespace(id="other"), SimpleNamespace(id="pitch")))  # type: ignore[arg-type]
+    case_study = replace(MADE, levels=(SimpleNamespace(id="other"), SimpleNamespace(id="pitch")))  # type: ignore[arg-type]
 
-    def caption(shown: LevelsResult, *courses: TrackCourse) -> str:
+    def caption(people_figures_drawn: LevelsResult, *courses: TrackCourse) -> str:
         monkeypatch.setattr(level_figures, "track_courses", lambda block, *_: courses if block.id == "pitch" else ())
-        drawn: Any = level_figures._track_picture(made, shown, ("svg",), "tracks-pitch", pd.DataFrame)
-        of, name, title, text, *_ = drawn
+        picture: Any = level_figures._track_picture(
+            case_study, people_figures_drawn, ("svg",), "tracks-pitch", pd.DataFrame
+        )
+        of, name, title, text, *_ = picture
         assert (of, name, title) == ("pitch", "tracks-pitch", "Pitch: tracks")
         return str(text)
 

@@ -27,7 +27,8 @@ LOOK = Look("Ratings", [], ["n = 4"], style.fonts())
 def columns(count: int, name: str = "Light oil") -> tuple[Column, ...]:
     values = [{person: value + place for person, value in PEOPLE.items()} for place in range(count)]
     return tuple(
-        Column(name=f"{name} {place}", values=one, mean=mean_of(one.values())) for place, one in enumerate(values)
+        Column(name=f"{name} {place}", values=column_values, mean=mean_of(column_values.values()))
+        for place, column_values in enumerate(values)
     )
 
 
@@ -46,7 +47,7 @@ def test_each_participant_is_a_point_of_the_group_and_the_mean_has_its_interval(
     half = 3.182446 * np.sqrt(10 / 3) / 2
     ends = [np.asarray(line.get_ydata()).tolist() for line in axes.lines if line.get_linewidth() == 1.5]
     assert [3.0 - half, 3.0 + half] == pytest.approx(
-        next(one for one in ends if sum(one) == pytest.approx(6.0)), abs=1e-5
+        next(end for end in ends if sum(end) == pytest.approx(6.0)), abs=1e-5
     )
 
 
@@ -72,8 +73,8 @@ def test_means_of_an_equivalence_test_have_its_90_percent_interval() -> None:
 @pytest.mark.parametrize("panels", [1, 2, 5, 9])
 @pytest.mark.parametrize("shared", [True, False])
 def test_no_text_leaves_the_figure_or_touches_another(panels: int, shared: bool) -> None:
-    made = [Panel(title=f"Statement {place} of many", columns=columns(3)) for place in range(panels)]
-    figure = draw_people(made, LOOK, above="Points of the scale", below="Liquid", shared=shared).figure
+    drawn_panels = [Panel(title=f"Statement {place} of many", columns=columns(3)) for place in range(panels)]
+    figure = draw_people(drawn_panels, LOOK, above="Points of the scale", below="Liquid", shared=shared).figure
     figure.canvas.draw()
     texts = [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
     boxes = [(text.get_text(), text.get_window_extent().padded(-1)) for text in texts]
@@ -100,8 +101,8 @@ GROUPS = ("experts", "novices")
 
 def split_panel(*, log: bool) -> Panel:
     doubled = {person: 2 * value for person, value in RATIOS.items()}
-    made = (Column(name="Thin", values=RATIOS), Column(name="Thick", values=doubled))
-    return Panel(columns=made, log=log).split(MEMBERS, GROUPS)
+    group_columns = (Column(name="Thin", values=RATIOS), Column(name="Thick", values=doubled))
+    return Panel(columns=group_columns, log=log).split(MEMBERS, GROUPS)
 
 
 @pytest.mark.parametrize(("log", "means"), [(False, [1.25, 7.0]), (True, [1.0, 6.0])])
@@ -109,11 +110,11 @@ def test_groups_are_side_by_side_with_the_mean_of_their_own_participants(log: bo
     """The geometric means of 0.5 and 2, and of 3, 12 and 6, are 1 and 6."""
     figure = draw_people([split_panel(log=log)], LOOK, above="Points", members=MEMBERS).figure
     (axes,) = figure.axes
-    drawn = [line for line in axes.lines if line.get_gid() == "mean"]
-    assert [line.get_ydata()[0] for line in drawn] == pytest.approx([*means, *(2 * mean for mean in means)])
+    mean_lines = [line for line in axes.lines if line.get_gid() == "mean"]
+    assert [line.get_ydata()[0] for line in mean_lines] == pytest.approx([*means, *(2 * mean for mean in means)])
     points = {str(line.get_gid()): line for line in axes.lines if str(line.get_gid()).startswith("person-")}
     colours = [points[f"person-{person}"].get_color() for person in ("A", "B", "C", "D", "E")]
-    assert colours == [drawn[0].get_color()] * 2 + [drawn[1].get_color()] * 3
+    assert colours == [mean_lines[0].get_color()] * 2 + [mean_lines[1].get_color()] * 3
     assert [text.get_text() for text in axes.get_xticklabels()] == ["Thin", "Thick"]
     xs = {person: points[f"person-{person}"].get_xdata() for person in MEMBERS}
     for column in (0, 1):
@@ -127,20 +128,20 @@ def test_a_picture_has_its_titles_at_their_places_and_the_groups_of_its_own_part
     split: str, means: int, legend: set[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A third group has nobody in the panels."""
-    made = study(liquids(1), [(person, 1, "L1", (4, 4)) for person in "ABCDEF"])
-    people = made.participants.assign(group=[*MEMBERS.values(), "others"])
-    made = replace(made, participants=people, split=split)
-    monkeypatch.setattr(people_figures, "picture_of", lambda *given: given)
+    case_study = study(liquids(1), [(person, 1, "L1", (4, 4)) for person in "ABCDEF"])
+    people = case_study.participants.assign(group=[*MEMBERS.values(), "others"])
+    case_study = replace(case_study, participants=people, split=split)
+    monkeypatch.setattr(people_figures, "picture_of", lambda *arguments: arguments)
     values = {"Thin": RATIOS, "Thick": dict(list(RATIOS.items())[:4])}
     panels = [Panel(columns=tuple(Column(name=name, values=own) for name, own in values.items()), level=0.9)]
-    shown: Any = people_figures.people_picture(
-        made, "b", "file", "Title", "Caption.", panels, ("svg",), above="Points", below="Liquid"
+    picture: Any = people_figures.people_picture(
+        case_study, "b", "file", "Title", "Caption.", panels, ("svg",), above="Points", below="Liquid"
     )
-    of_study, *words, draw, forms, counts, numbers = shown
-    assert of_study is made
+    of_study, *words, draw, forms, counts, numbers = picture
+    assert of_study is case_study
     assert (*words[:3], forms, counts) == ("b", "file", "Title", ("svg",), ("n = 5",))
-    told = " Diamonds show group means with 90 % confidence intervals (Student's t)."
-    assert words[3] == f"Caption.{told if split else ''}"
+    interval_note = " Diamonds show group means with 90 % confidence intervals (Student's t)."
+    assert words[3] == f"Caption.{interval_note if split else ''}"
     assert [line.split("	")[:2] for line in numbers.splitlines()[1:6]] == [[*member] for member in MEMBERS.items()]
     figure = draw(LOOK).figure
     figure.canvas.draw()
@@ -194,16 +195,16 @@ def test_an_interval_beyond_the_scale_ends_at_its_edge_with_an_arrow() -> None:
     two = [Column(name="a", values={}, mean=mean), Column(name="b", values={}, mean=within)]
     (axes,) = draw_people([Panel(columns=two, ends=(1.0, 7.0))], LOOK, above="Points").figure.axes
     bottom, top = axes.get_ylim()
-    drawn = [list(line.get_ydata()) for line in axes.lines if line.get_gid() == "interval"]
+    interval_lines = [list(line.get_ydata()) for line in axes.lines if line.get_gid() == "interval"]
     arrows = {line.get_marker(): line.get_ydata()[0] for line in axes.lines if line.get_marker() in {"v", "^"}}
-    assert (drawn, arrows) == ([[bottom, top], [3.2, 4.9]], {"v": bottom, "^": top})
+    assert (interval_lines, arrows) == ([[bottom, top], [3.2, 4.9]], {"v": bottom, "^": top})
 
 
 def test_the_legend_of_levels_has_the_colours_of_the_bars() -> None:
     settings = liquids(1)
-    given = [level for level in range(1, 8) for _ in range(level)]
-    made = study(settings, [(f"P{place:03d}", 1, "L1", (level, 4)) for place, level in enumerate(given)])
-    figure = answer_figures.draw_block(made, made.blocks[0], {}, LOOK).figure
+    levels_given = [level for level in range(1, 8) for _ in range(level)]
+    case_study = study(settings, [(f"P{place:03d}", 1, "L1", (level, 4)) for place, level in enumerate(levels_given)])
+    figure = answer_figures.draw_block(case_study, case_study.blocks[0], {}, LOOK).figure
     figure.canvas.draw()
     labels = [text for text in figure.texts if text.get_text() in set("1234567")]
     colours = {
@@ -219,11 +220,14 @@ def test_the_legend_of_levels_has_the_colours_of_the_bars() -> None:
 
 
 @pytest.mark.parametrize("panels", [1, 6])
-def test_participants_with_equal_numbers_can_be_told_apart(panels: int) -> None:
+def test_participants_with_equal_numbers_are_drawn_apart(panels: int) -> None:
     values = {f"P{number:02d}": 50.0 if number < 9 else 5.0 * number for number in range(16)}
-    made = [Panel(columns=(Column(name="", values=values),), ends=(0.0, 100.0))] * panels
-    figure = draw_people(made, LOOK, above="").figure
+    equal_panels = [Panel(columns=(Column(name="", values=values),), ends=(0.0, 100.0))] * panels
+    figure = draw_people(equal_panels, LOOK, above="").figure
     for axes in figure.axes:
         points = [axes.transData.transform(line.get_xydata())[0] * 72 / figure.dpi for line in axes.lines
                   if str(line.get_gid()).startswith("person-")]  # fmt: skip
-        assert min(float(np.hypot(*(one - other))) for one, other in combinations(points, 2)) >= POINT["markersize"]
+        assert (
+            min(float(np.hypot(*(point - other_point))) for point, other_point in combinations(points, 2))
+            >= POINT["markersize"]
+        )

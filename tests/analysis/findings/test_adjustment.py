@@ -17,7 +17,7 @@ from study_app.analysis.findings import statement_tests
         (3, 0.03, 0.09, "p adjusted (Holm) across 3 tests"),
     ],
 )
-def test_a_p_value_that_the_test_over_all_statements_raised_is_not_called_unadjusted(
+def test_a_p_value_raised_by_the_test_over_all_statements_is_not_called_unadjusted(
     members: int, p: float | None, p_adjusted: float | None, note: str
 ) -> None:
     test: Any = SimpleNamespace(members=members, correction="Holm", p_adjusted=p_adjusted, outcome=SimpleNamespace(p=p))

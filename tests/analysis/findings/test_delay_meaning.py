@@ -33,7 +33,7 @@ def against(differences: Mapping[float, list[int]]) -> tuple[ContrastWithControl
 
 
 def delays(differences: Mapping[float, list[int]], lowest: tuple[LowestTrend, ...] = ()) -> BlockResult:
-    """Return a block of delays in which answers to one statement differ so from those at 0 ms."""
+    """Return a block of delays with these differences from 0 ms in one statement."""
     at = (0.0, *differences)
     return BlockResult(
         id="delays",
@@ -53,7 +53,7 @@ def delays(differences: Mapping[float, list[int]], lowest: tuple[LowestTrend, ..
     )
 
 
-def found(block: BlockResult) -> Found:
+def results_of_block(block: BlockResult) -> Found:
     return Found(NOTHING_DECIDED, (), (block,), (), {}, None, 1)
 
 
@@ -73,7 +73,7 @@ def test_the_sentence_about_one_delay_follows_the_verdict(differences: list[int]
     assert said in rows_by_delay(delays({50: differences}))[0][-1]
 
 
-def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -> None:
+def test_a_trend_within_one_statement_does_not_contradict_equivalence() -> None:
     steps = step_down([[1, 3, 5], [1, 3, 5], [1, 3, 5], [3, 1, 5], [1, 3, 5]], [0, 50, 100], alpha=0.2)
     alone, of_five = LowestTrend("different", steps), LowestTrend("different", steps, members=5)
     assert alone.over_all_ms == steps.lowest_ms == 50
@@ -89,25 +89,26 @@ def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -
 NEITHER = "(one for each statement and delay), the data show neither that the mean answer stays within ±1 point nor"
 
 
-def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> None:
+def test_equivalence_by_the_t_test_alone_is_reported_as_inconclusive(rek: Results) -> None:
     block = delays({50: DOUBTED})
     assert ContrastsWithControl.value_in(block)[0].found.p is not None
     assert ContrastsWithControl.value_in(block)[0].found.p < 0.05
     assert ContrastsWithControl.value_in(block)[0].found.checks_agree is False
-    ((*told, said),) = rows_by_delay(block)
-    assert told == ["50 ms", "–", "–", "Different", "–"]
-    assert UNCLEAR in said
+    ((*other_rows, conclusion),) = rows_by_delay(block)
+    assert other_rows == ["50 ms", "–", "–", "Different", "–"]
+    assert UNCLEAR in conclusion
     rek.add("P001", lambda *_: 4)
     assert any(
-        f"in 1 of 1 comparison with 0 ms {NEITHER}" in line for line in limits(load_study(rek.folder), found(block))
+        f"in 1 of 1 comparison with 0 ms {NEITHER}" in line
+        for line in limits(load_study(rek.folder), results_of_block(block))
     )
 
 
 def test_limits_do_not_call_an_interval_beyond_the_bound_inconclusive(rek: Results) -> None:
     rek.add("P001", lambda *_: 4)
-    lines = limits(load_study(rek.folder), found(delays({50: DOUBTED, 150: [2] * 17})))
+    lines = limits(load_study(rek.folder), results_of_block(delays({50: DOUBTED, 150: [2] * 17})))
     assert any(f"in 1 of 2 comparisons with 0 ms {NEITHER}" in line for line in lines)
-    assert not any(NEITHER in line for line in limits(load_study(rek.folder), found(delays({150: AWAY}))))
+    assert not any(NEITHER in line for line in limits(load_study(rek.folder), results_of_block(delays({150: AWAY}))))
     (row,) = rows_by_delay(delays({150: AWAY}))
     assert row[:-1] == ["150 ms", "–", "Different", "–", "–"]
 

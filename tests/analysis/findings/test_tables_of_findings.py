@@ -9,10 +9,10 @@ import pytest
 
 from study_app.analysis import results as analysis_results
 from study_app.analysis.data.blocks import Item
+from study_app.analysis.findings import cumulative_models, statement_tests
 from study_app.analysis.findings import delays as delay_findings
 from study_app.analysis.findings import finding as findings
 from study_app.analysis.findings import recognition as recognition_findings
-from study_app.analysis.findings import statement_tests
 from study_app.analysis.findings.finding import block_answers, codes_of, summarize_block, verdict, verdict_row
 from study_app.analysis.page_layout import Drawing
 from study_app.analysis.results import BlockResult, Failures
@@ -30,20 +30,20 @@ RESULTS: Any = SimpleNamespace(decided=DECIDED)
 def block(kind: Any = "liquids", **changes: Any) -> BlockResult:
     """Return the result of a block of three settings."""
     settings = delays((10, 40, 90)) if kind == "delays" else liquids(3)
-    made = BlockResult(
+    block_result = BlockResult(
         id="b", title="Block", kind=kind, revealed=True, n=12, settings=settings, names=("Thin", "Wax", "Tar"),
         items=ITEMS, labels=(), measures=(),
     )  # fmt: skip
-    return replace(made, **changes)
+    return replace(block_result, **changes)
 
 
 def ranks(**changes: Any) -> SignedRanks:
-    held = {
+    fields = {
         "test": "Wilcoxon signed ranks", "n": 11, "dropped": 1, "statistic_name": "V", "statistic": 23.5, "p": 0.0312,
         "smallest_p": 0.002, "method": "exact", "effect_name": "rank-biserial", "effect": 0.41, "interval": ENDS,
         "zeros": 2, "superiority": 0.3, "median_difference": 1.0,
     }  # fmt: skip
-    return SignedRanks(**{**held, **changes})
+    return SignedRanks(**{**fields, **changes})
 
 
 def with_verdict(item: str, outcome: Any, *, result: Any = "shown", primary: bool = True, members: int = 2) -> Any:
@@ -181,12 +181,29 @@ def test_pairs_have_the_names_and_numbers_of_their_settings() -> None:
     ]  # fmt: skip
 
 
+def test_methods_count_the_statements_to_which_a_model_could_not_be_fitted() -> None:
+    def tested(item: str, p: float | None) -> Any:
+        return with_verdict(item, SimpleNamespace(p=p, note="the answers hardly vary"))
+
+    fitted = [tested("warm", 0.03)]
+    failed = [tested("thick", None), tested("calm", None)]
+    for tests, note in (
+        ((*fitted, *failed), "1 primary statement (it could not be fitted to the other two statements), including"),
+        ((*fitted, *failed[:1]), "1 primary statement (it could not be fitted to the other statement), including"),
+        (fitted, "1 primary statement, including"),
+    ):
+        (sentence,) = cumulative_models._CumulativeModels(
+            block(findings={"cumulative": tuple(tests)}), RESULTS
+        ).methods()
+        assert note in sentence
+
+
 def test_mean_tests_have_the_spread_of_slopes_or_the_differences_from_the_first_setting() -> None:
     intervals = (
         Interval(low=0.1, high=0.9, level=0.95, method="t"),
         Interval(low=-2.0, high=-1.0, level=0.95, method="t"),
     )
-    held = {"n": 16, "dropped": 0, "statistic_name": "F", "statistic": 4.5, "p": 0.03, "effect_name": "slope"}
+    fields = {"n": 16, "dropped": 0, "statistic_name": "F", "statistic": 4.5, "p": 0.03, "effect_name": "slope"}
     of_liquids = SlopeTest(
         test=HOTELLING,
         slopes=(0.5, -1.5),
@@ -194,7 +211,7 @@ def test_mean_tests_have_the_spread_of_slopes_or_the_differences_from_the_first_
         sds=(0.8, 1.6),
         intercept_sd=1.25,
         method="F(2, 14)",
-        **held,
+        **fields,
     )
     finding = statement_tests.MeanTests(block(findings={"mixed": (with_verdict("calm", of_liquids),)}), RESULTS)
     lines = lines_of(finding.section())
@@ -218,13 +235,13 @@ def test_mean_tests_have_the_spread_of_slopes_or_the_differences_from_the_first_
 
 def against(item: str, delay_ms: float, verdict_: str, **changes: Any) -> Any:
     beyond = SimpleNamespace(count=3, n=11, interval=SimpleNamespace(low=0.06, high=0.61))
-    held = {
+    fields = {
         **{name: getattr(ranks(), name) for name in ("test", "n", "dropped", "statistic_name", "statistic", "p")},
         **{name: getattr(ranks(), name) for name in ("smallest_p", "method", "effect_name", "effect", "interval")},
         "no_interval": "", "note": "", "bound": 0.5, "alpha": 0.025, "verdict": verdict_, "p_bootstrap": 0.047,
         "checks_agree": True, "beyond": beyond,
     }  # fmt: skip
-    tested_delay: Any = SimpleNamespace(**{**held, **changes})
+    tested_delay: Any = SimpleNamespace(**{**fields, **changes})
     return delay_findings.ContrastWithControl(item, delay_ms, 10.0, tested_delay)
 
 
@@ -268,10 +285,10 @@ def test_comparisons_with_the_shortest_delay_have_their_own_numbers() -> None:
 
 def test_the_answer_on_unchanged_delays_follows_from_all_statements() -> None:
     def answer(*comparisons: Any, n: int = 200) -> tuple[str, str]:
-        given = delay_findings._EquivalentDelays(
+        given_answer = delay_findings._EquivalentDelays(
             block("delays", n=n, findings={"against": comparisons}), RESULTS
         ).answer()
-        return given.verdict, given.text
+        return given_answer.verdict, given_answer.text
 
     share = SimpleNamespace(count=1, n=9, interval=SimpleNamespace(low=0.0, high=0.33))
     both = against("warm", 40.0, "equivalent"), against("thick", 40.0, "equivalent", beyond=share)
@@ -293,13 +310,13 @@ def test_the_answer_on_unchanged_delays_follows_from_all_statements() -> None:
 
 
 def lowest(item: str, *steps: tuple[float, float | None], members: int = 2) -> Any:
-    made = [
+    trends = [
         SimpleNamespace(longest_ms=ms, trend=SimpleNamespace(**vars_of(ranks(p=p, effect=0.3 + ms / 1000))))
         for ms, p in steps
     ]
     reached = [ms for ms, p in steps if p is not None and p <= 0.05]
-    held: Any = SimpleNamespace(steps=tuple(made), lowest_ms=min(reached, default=None), alpha=0.05, note="")
-    return delay_findings.LowestTrend(item, held, members)
+    fields: Any = SimpleNamespace(steps=tuple(trends), lowest_ms=min(reached, default=None), alpha=0.05, note="")
+    return delay_findings.LowestTrend(item, fields, members)
 
 
 def vars_of(outcome: Any) -> dict[str, Any]:
@@ -355,8 +372,10 @@ def test_the_answer_on_noticed_delays_prefers_primary_statements_and_turns_falli
 
     def answer(*lowest_trends: Any, primary: tuple[str, ...] = ("warm",)) -> tuple[str, str]:
         results: Any = SimpleNamespace(decided=replace(decided, primary=primary))
-        given = delay_findings._FirstNoticedDelay(block("delays", findings={"lowest": lowest_trends}), results).answer()
-        return given.verdict, given.text
+        given_answer = delay_findings._FirstNoticedDelay(
+            block("delays", findings={"lowest": lowest_trends}), results
+        ).answer()
+        return given_answer.verdict, given_answer.text
 
     rest = (
         " With two statements tested, p ≤ 0.025 (0.05 / 2) is significant. Participants may also notice shorter "
@@ -381,14 +400,14 @@ def test_the_answer_on_noticed_delays_prefers_primary_statements_and_turns_falli
 
 
 def threshold(**changes: Any) -> Any:
-    held = {
+    fields = {
         "effect": 57.3, "n": 9, "guess": 0.1, "lapse": 0.04, "half_way": 0.53, "width": 20.0,
         "levels": (10.0, 40.0, 90.0),
         "yes": (1, 4, 8), "asked": (9, 8, 9), "note": "few answers", "method": "posterior median",
         "no_interval": "open",
         "interval": Interval(low=41.4, high=88.6, level=0.95, method="b"),
     }  # fmt: skip
-    return SimpleNamespace(**{**held, **changes})
+    return SimpleNamespace(**{**fields, **changes})
 
 
 def test_the_detection_threshold_has_its_interval_shares_and_the_counts_at_each_delay() -> None:
@@ -421,11 +440,15 @@ def test_the_figure_of_the_threshold_has_the_share_of_each_participant() -> None
         return agreed.get((key[0], code, counts[key]), 4) if item == "different" else 7
 
     settings = delays((10, 40, 90))
-    made = study(settings, list(everybody(settings, 2, given, repetitions=2)), replace(DECIDED, noticed="different"))
-    made = replace(made, responses=made.responses.assign(response=made.responses["response"].astype("Int64")))
+    case_study = study(
+        settings, list(everybody(settings, 2, given, repetitions=2)), replace(DECIDED, noticed="different")
+    )
+    case_study = replace(
+        case_study, responses=case_study.responses.assign(response=case_study.responses["response"].astype("Int64"))
+    )
     result = block("delays", findings={"threshold": threshold(), "lowest": (*LOWEST, lowest("thick", (40.0, 0.01)))})
-    results: Any = SimpleNamespace(decided=made.decided)
-    drawing = Drawing(made, made.blocks[0], result, results, "threshold-b", ())
+    results: Any = SimpleNamespace(decided=case_study.decided)
+    drawing = Drawing(case_study, case_study.blocks[0], result, results, "threshold-b", ())
     finding = delay_findings.DetectionThreshold(result, results)
     assert finding._shares(drawing) == {"P000": {10: 0.0, 40: 0.5, 90: 1.0}, "P001": {10: 0.5, 40: 0.0, 90: 0.0}}
     picture = finding.figure(drawing)
@@ -448,9 +471,19 @@ def named(**changes: Any) -> Any:
         "undecided": 2, "unanswered": 1, "rates": RATES, "no_interval": "",
         "table": ((9, 1, 0, 4, 0), (2, 7, 1, 5, 0), (3, 3, 3, 6, 1)),
     }  # fmt: skip
-    found: Any = SimpleNamespace(**{**outcome, **changes.pop("found", {})})
-    held = {"labels": ("warm", "thick", "calm"), "right": ("warm", "thick", None), "settings": ("L1", "L2", "L3")}
-    return SimpleNamespace(**{**held, "found": found, "verdict": "shown", **changes})
+    rates_result: Any = SimpleNamespace(**{**outcome, **changes.pop("found", {})})
+    fields = {"labels": ("warm", "thick", "calm"), "right": ("warm", "thick", None), "settings": ("L1", "L2", "L3")}
+    return SimpleNamespace(**{**fields, "found": rates_result, "verdict": "shown", **changes})
+
+
+def test_recognition_is_not_missing_from_studies_that_do_not_ask_for_it() -> None:
+    settings = tuple(replace(setting, label=None) for setting in liquids(3))
+    for labelled, absent in ((liquids(3), 1), (settings, 0)):
+        made = study(labelled, list(everybody(labelled, 6, lambda person, _session, code, _item: 2 + person % 3)))
+        without_names = replace(made, decided=replace(made.decided, names=()))
+        answers = block_answers(without_names, made.blocks[0], 1, Failures())
+        found, reasons = recognition_findings.LiquidRecognition.test(answers, summarize_block(None, answers))
+        assert (found, len(reasons)) == (None, absent)
 
 
 def test_recognised_liquids_have_their_counts_rivals_and_kappa() -> None:
@@ -485,7 +518,7 @@ def test_the_answer_on_liquids_names_recognised_and_differing_ones() -> None:
         statement_tests.Effect(item=item, code=code, n=n, mean=mean, low=mean - 1, high=mean + 1)
         for item, code, n, mean in (("warm", "L2", 10, 1.25), ("thick", "L3", 9, -2.5), ("calm", "L2", 8, 5.0))
     )
-    held = {
+    fields = {
         "named": named(), "pairs": pairs, "effects": effects,
         "omnibus": (
             *(with_verdict(item, ranks()) for item in ("thick", "warm")),
@@ -494,9 +527,9 @@ def test_the_answer_on_liquids_names_recognised_and_differing_ones() -> None:
     }  # fmt: skip
 
     def answer(**changes: Any) -> tuple[str, str]:
-        given = recognition_findings._Distinguished(block(findings={**held, **changes}), RESULTS).answer()
-        assert given.claims is (given.verdict != "not shown")
-        return given.verdict, given.text
+        given_answer = recognition_findings._Distinguished(block(findings={**fields, **changes}), RESULTS).answer()
+        assert given_answer.claims is (given_answer.verdict != "not shown")
+        return given_answer.verdict, given_answer.text
 
     largest = (
         " The largest mean difference from thin is −2.50 points (“Thick” for tar, 95 % confidence interval [−3.50, "
@@ -524,10 +557,10 @@ def test_the_answer_on_liquids_names_recognised_and_differing_ones() -> None:
 
 @pytest.mark.slow
 def test_the_figure_of_recognition_has_the_names_and_counts() -> None:
-    made = study(liquids(3), list(everybody(liquids(3), 11, lambda *_: 4)))
+    case_study = study(liquids(3), list(everybody(liquids(3), 11, lambda *_: 4)))
     result = block(findings={"named": named()})
     finding = recognition_findings.LiquidRecognition(result, RESULTS)
-    picture = finding.figure(Drawing(made, made.blocks[0], result, RESULTS, "recognition-b", ()))
+    picture = finding.figure(Drawing(case_study, case_study.blocks[0], result, RESULTS, "recognition-b", ()))
     assert picture is not None
     assert picture.numbers.splitlines() == [
         "liquid\tWarm\tThick\tCalm\tundecided\tunanswered", "Thin\t9\t1\t0\t4\t0", "Wax\t2\t7\t1\t5\t0",
@@ -539,15 +572,15 @@ def test_the_figure_of_recognition_has_the_names_and_counts() -> None:
     )
 
 
-def test_the_summary_of_a_block_counts_presentations_sessions_and_who_left_out_what() -> None:
+def test_the_summary_of_a_block_counts_presentations_sessions_and_missing_answers() -> None:
     settings = delays((50, 10, 50))
     rows = [
         ("P1", 1, "D1", (4, None)), ("P1", 1, "D2", (3, 2)), ("P1", 1, "D3", (4, 5)), ("P2", 2, "D1", (4, 4)),
         ("P2", 2, "D2", (None, 4)),
     ]  # fmt: skip
-    made = study(settings, rows)
-    answers = block_answers(made, made.blocks[0], 1, Failures())
-    result = summarize_block(made, answers)
+    case_study = study(settings, rows)
+    answers = block_answers(case_study, case_study.blocks[0], 1, Failures())
+    result = summarize_block(case_study, answers)
     assert (result.n, result.presentations, result.sessions, result.replicated_ms) == (2, (1, 2), (1, 2), (50.0,))
     assert result.incomplete == {"different": ("P2",)}
     assert answers.values["harder"].tolist() == [[2.0, 5.0], [4.0, 4.0]]

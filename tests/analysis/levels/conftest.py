@@ -15,7 +15,7 @@ from tests.studies import made_up, once, quick_pdfs
 
 @pytest.fixture(scope="session")
 def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a study of up–down tracks at two standards and of QUEST+ at one, its key open."""
+    """Return an unblinded study of up–down tracks at two standards and of QUEST+ at one."""
 
     def make(folder: Path) -> None:
         (folder / "adaptive.toml").write_text(

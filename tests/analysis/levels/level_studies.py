@@ -43,20 +43,20 @@ def matching_file(folder: Path) -> Path:
 def block(
     design: Design | str = "2ifc", stimulus: Stimulus | None = STIMULUS, settings: tuple[Setting, ...] = ()
 ) -> LevelBlock:
-    """Return a block of constant stimuli, or of conditions where there is no stimulus."""
+    """Return a block of constant stimuli, or of conditions if there is no stimulus."""
     kind = default_design(design) if isinstance(design, str) else design
     return LevelBlock("b", "Block", "main", kind, stimulus, settings, Constant() if stimulus else None)
 
 
 def rows(people: dict[str, float], trials: int = 400) -> pd.DataFrame:
     """Return rows of tracks of people with planted thresholds."""
-    draw, found = np.random.default_rng(4), []
+    draw, trial_rows = np.random.default_rng(4), []
     for person, threshold in people.items():
         for number in range(trials):
             level = LEVELS[number % len(LEVELS)]
             right = bool(draw.random() < success("weibull", math.log10(level), math.log10(threshold), 1.4, 0.5, 0.01))
-            found.append((person, "01", number + 1, "b", 8.0, level, level, True, right))
-    return arranged(pd.DataFrame(found, columns=NAMES))
+            trial_rows.append((person, "01", number + 1, "b", 8.0, level, level, True, right))
+    return arranged(pd.DataFrame(trial_rows, columns=NAMES))
 
 
 def arranged(frame: pd.DataFrame) -> pd.DataFrame:

@@ -23,32 +23,38 @@ def study(opened_catch: Path) -> Study:
 
 
 @pytest.fixture(scope="module")
-def opened(study: Study) -> pd.DataFrame:
+def opened_tracks(study: Study) -> pd.DataFrame:
     return tracks(study)
 
 
 @pytest.fixture(scope="module")
 def staircase(study: Study) -> LevelsResult:
-    return next(found for found in level_results(study) if found.block == "staircase")
+    return next(level_result for level_result in level_results(study) if level_result.block == "staircase")
 
 
-def test_a_catch_trial_is_never_a_reversal(opened: pd.DataFrame) -> None:
-    own = opened[opened["block"] == "staircase"]
-    caught = own["catch"].astype(bool)
-    assert caught.sum() >= 10
-    assert own.loc[caught, "reversal"].isna().all()
-    assert own.loc[~caught, "reversal"].notna().all()
-    assert own.loc[~caught, "reversal"].sum() >= 10
+def test_a_catch_trial_is_never_a_reversal(opened_tracks: pd.DataFrame) -> None:
+    own = opened_tracks[opened_tracks["block"] == "staircase"]
+    is_catch = own["catch"].astype(bool)
+    assert is_catch.sum() >= 10
+    assert own.loc[is_catch, "reversal"].isna().all()
+    assert own.loc[~is_catch, "reversal"].notna().all()
+    assert own.loc[~is_catch, "reversal"].sum() >= 10
 
 
 def test_answers_to_catch_trials_are_apart_from_those_at_their_level(
-    staircase: LevelsResult, opened: pd.DataFrame
+    staircase: LevelsResult, opened_tracks: pd.DataFrame
 ) -> None:
-    own = opened[(opened["block"] == "staircase") & (opened["participant"] == "P001") & (opened["standard"] == 4)]
-    shown = [one for one in staircase.statistics["answers"] if one.participant == "P001" and one.standard == 4]
-    assert sum(one.n for one in shown if one.catch) == own["catch"].astype(bool).sum()
-    assert sum(one.n for one in shown) == len(own)
-    assert {one.level for one in shown if one.catch} == {0.6}
+    own = opened_tracks[
+        (opened_tracks["block"] == "staircase")
+        & (opened_tracks["participant"] == "P001")
+        & (opened_tracks["standard"] == 4)
+    ]
+    counts_at_level = [
+        counts for counts in staircase.statistics["answers"] if counts.participant == "P001" and counts.standard == 4
+    ]
+    assert sum(counts.n for counts in counts_at_level if counts.catch) == own["catch"].astype(bool).sum()
+    assert sum(counts.n for counts in counts_at_level) == len(own)
+    assert {counts.level for counts in counts_at_level if counts.catch} == {0.6}
 
 
 def test_the_methods_state_the_rule_on_catch_trials_and_the_sessions_that_it_excluded(study: Study) -> None:

@@ -38,8 +38,8 @@ BLOCKS = {
 
 
 def rows(block: LevelBlock, seed: int) -> list[dict[str, Any]]:
-    """Return two people's answers to levels of each standard: some catch trials, one trial not analysed."""
-    draw, found = np.random.default_rng(seed), []
+    """Return two participants' answers to levels of each standard, with catch trials and one trial not analysed."""
+    draw, trial_rows = np.random.default_rng(seed), []
     stimulus = block.stimulus
     count = 10 if stimulus is LINK else 3
     for person in ("P001", "P002"):
@@ -47,26 +47,26 @@ def rows(block: LevelBlock, seed: int) -> list[dict[str, Any]]:
             standard = stimulus.standards[trial % len(stimulus.standards)] if stimulus else None
             level = stimulus.spaced(count)[trial // len(stimulus.standards) % count] if stimulus else None
             arrangement = trial % max(1, len(block.design.arrangements))
-            choices = sorted(block.design.answers, key=lambda one: not block.design.is_correct(arrangement, one))
+            choices = sorted(block.design.answers, key=lambda answer: not block.design.is_correct(arrangement, answer))
             right = bool(draw.random() < 0.4 + 0.5 * (trial % 3) / 2)
             letters = block.design.arrangement_text(arrangement) if block.design.arrangements else "C"
-            found.append(
+            trial_rows.append(
                 {
                     "participant": person, "session": 1, "trial": trial, "block": block.id, "code": "V1",
                     "track": "honey" if stimulus is None and trial % 2 else "water" if stimulus is None else "8/1",
                     "catch": trial % 9 == 0 and stimulus is not None, "standard": standard, "level": level,
                     "level_delivered": level and level * (1.02 if trial % 5 else 0.97), "comparison": None,
-                    "arrangement": letters, "analysed": trial != 5, "reversal": trial % 7 == 0,
+                    "outcome": "completed", "arrangement": letters, "analysed": trial != 5, "reversal": trial % 7 == 0,
                     "response": choices[not right] if choices else str(trial), "success": right, "right": right,
                     "value": round(float(draw.lognormal()), 3) if block.design.reply == "number" else 1 + trial % 5,
                     "response_s": round(float(draw.lognormal(0.2, 0.3)), 3), "setting": None,
                 }
             )  # fmt: skip
-    return found
+    return trial_rows
 
 
 def intervals(opened: pd.DataFrame) -> pd.DataFrame:
-    """Return what trials presented: every fifth was repeated for a reason, and force was withheld."""
+    """Return the presented intervals: every fifth trial was repeated, with a reason, and force was withheld."""
     presented = opened.assign(attempt=1, counted=True, presented="comparison", pace_mps=0.1 + opened["trial"] / 1000)
     presented["withheld_share"] = (opened["trial"] % 4) / 10
     presented["apparent_mass_kg"] = opened["trial"] / 100
@@ -80,16 +80,20 @@ def intervals(opened: pd.DataFrame) -> pd.DataFrame:
 
 
 def test_answers_to_levels_are_counted_by_hand() -> None:
-    every = [replace(one, id=name, title=name.capitalize()) for name, one in BLOCKS.items()]
-    frame = pd.DataFrame([row for seed, one in enumerate(every) for row in rows(one, seed)])
-    opened = frame.astype({"level_delivered": "Float64", **dict.fromkeys(("success", "right", "catch"), "boolean")})
-    made = study(delays([0, 50]), list(everybody(delays([0, 50]), 2, lambda *_: 4)))
-    answered = opened.assign(onset_s=1.0, first_choice_s=1.0 + opened["response_s"], counted=opened["analysed"])
-    asked = replace(made, levels=tuple(every), intervals=intervals(opened), answered=answered)
-    results = level_results(asked, opened)
+    every = [replace(block, id=name, title=name.capitalize()) for name, block in BLOCKS.items()]
+    frame = pd.DataFrame([row for seed, block in enumerate(every) for row in rows(block, seed)])
+    intervals_frame = frame.astype(
+        {"level_delivered": "Float64", **dict.fromkeys(("success", "right", "catch"), "boolean")}
+    )
+    case_study = study(delays([0, 50]), list(everybody(delays([0, 50]), 2, lambda *_: 4)))
+    answered = intervals_frame.assign(
+        onset_s=1.0, first_choice_s=1.0 + intervals_frame["response_s"], counted=intervals_frame["analysed"]
+    )
+    levels_study = replace(case_study, levels=tuple(every), intervals=intervals(intervals_frame), answered=answered)
+    results = level_results(levels_study, intervals_frame)
     assert [result.block for result in results] == list(BLOCKS)
     for result in results:
-        trials = opened[(opened["block"] == result.block) & opened["analysed"]]
+        trials = intervals_frame[(intervals_frame["block"] == result.block) & intervals_frame["analysed"]]
         answers = Answers.rows_in(result)
         assert answers
         assert sum(row.n for row in answers if row.participant is None) == len(trials)
@@ -117,10 +121,10 @@ def test_answers_to_levels_are_counted_by_hand() -> None:
 @pytest.mark.parametrize("most", [0.2, None])
 def test_incorrect_answers_to_catch_trials_are_counted_by_session(most: float | None) -> None:
     """Other blocks, other trials and trials without an answer do not count."""
-    given = {("P001", 1): "xx+", ("P001", 2): "+x++", ("P002", 1): "x"}
-    found = [
+    marks_of = {("P001", 1): "xx+", ("P001", 2): "+x++", ("P002", 1): "x"}
+    catch_rows = [
         (*visit, block, catch, {"x": False, "+": True}.get(mark))
-        for visit, marks in given.items()
+        for visit, marks in marks_of.items()
         for block, catch, answers in (
             ("b", True, f"{marks}-"),
             ("b", False, "xxx"),
@@ -129,12 +133,12 @@ def test_incorrect_answers_to_catch_trials_are_counted_by_session(most: float | 
         )
         for mark in answers
     ]
-    frame = pd.DataFrame(found, columns=["participant", "session", "block", "catch", "right"])
-    opened = frame.astype(dict.fromkeys(("catch", "right"), "boolean"))
-    counted = [] if most is None else [("P001", 1, 3, 2, most), ("P001", 2, 4, 1, most), ("P002", 1, 1, 1, most)]
-    rows = keyed("catches").compute(replace(BLOCKS["forced choice"], wrong_most=most), opened, None, None)
+    frame = pd.DataFrame(catch_rows, columns=["participant", "session", "block", "catch", "right"])
+    catch_frame = frame.astype(dict.fromkeys(("catch", "right"), "boolean"))
+    expected = [] if most is None else [("P001", 1, 3, 2, most), ("P001", 2, 4, 1, most), ("P002", 1, 1, 1, most)]
+    rows = keyed("catches").compute(replace(BLOCKS["forced choice"], wrong_most=most), catch_frame, None, None)
     names = ("participant", "session", "n", "wrong", "most")
-    assert list(rows) == [dict(zip(names, count, strict=True)) for count in counted]
+    assert list(rows) == [dict(zip(names, count, strict=True)) for count in expected]
 
 
 VISIT = {"participant": "P001", "session": 1, "block": "b"}
@@ -149,7 +153,7 @@ def keyed(key: str) -> Any:
     return next(statistic for statistic in statistics() if statistic.key == key)
 
 
-def shown(key: str, rows: Sequence[Any], **about: Any) -> Any:
+def statistic_with_rows(key: str, rows: Sequence[Any], **about: Any) -> Any:
     """Return a statistic with these rows, to be shown in the report."""
     about = {"summary": "share", "counts": "correct", "statistics": {key: tuple(rows)}, **about}
     result = LevelsResult(block="b", title="B", design="2ifc", revealed=True, times=(), **about)
@@ -163,13 +167,13 @@ def cells(statistic: Any) -> list[list[str]]:
 
 
 def test_the_delivery_of_each_standard_counts_analysed_trials_and_averages_their_last_attempts() -> None:
-    asked = [  # trial, standard, level, level_delivered, analysed; a level of 0 has no error
+    presentations = [  # trial, standard, level, level_delivered, analysed; a level of 0 has no error
         (1, 4.0, 0.2, 0.25, True), (2, 4.0, 0.4, 0.31, True), (3, 4.0, 0.0, 0.9, True), (4, 4.0, 0.3, None, True),
         (5, 8.0, 0.5, 0.44, True), (6, 8.0, 0.1, 0.7, False), (7, math.nan, 0.6, 0.61, True),
     ]  # fmt: skip
     names = ["trial", "standard", "level", "level_delivered", "analysed"]
-    opened = pd.DataFrame(asked, columns=names).astype({"level_delivered": "Float64"}).assign(**VISIT)
-    other = opened.assign(block="other", trial=opened["trial"] + 20)
+    intervals_frame = pd.DataFrame(presentations, columns=names).astype({"level_delivered": "Float64"}).assign(**VISIT)
+    other = intervals_frame.assign(block="other", trial=intervals_frame["trial"] + 20)
     presented = [  # trial, attempt, counted, reasons, speed, mass
         (1, 1, False, "slip pace_error_percent", 5.0, 1.0), (1, 1, False, "slip slip", 5.0, 1.0),
         (1, 2, True, None, 0.11, 0.021), (1, 2, True, None, 0.13, 0.023),
@@ -181,7 +185,7 @@ def test_the_delivery_of_each_standard_counts_analysed_trials_and_averages_their
     intervals = pd.DataFrame(presented, columns=names).assign(**VISIT)
     intervals["block"] = np.where(intervals["trial"] > 20, "other", "b")
     study, delivery = SimpleNamespace(intervals=intervals), keyed("conduct")
-    first, second, third = delivery.compute(block(), pd.concat([opened, other]), study, None)
+    first, second, third = delivery.compute(block(), pd.concat([intervals_frame, other]), study, None)
     rows = first, second, third
     assert [row.pop("reasons") for row in map(dict, rows)] == [{"pace_error_percent": 3, "slip": 2}, {"slip": 2}, {}]
     of_4 = {"trials": 4, "repeated": 1, "measured": 2, "error_mean": -0.02, "error_largest": 0.09}
@@ -193,8 +197,8 @@ def test_the_delivery_of_each_standard_counts_analysed_trials_and_averages_their
         (third, last | {"standard": None, "pace_mps": None, "apparent_mass_kg": None}),
     ):
         assert {name: value for name, value in row.items() if name != "reasons"} == pytest.approx(expected)
-    assert list(delivery.compute(replace(block(), stimulus=None), opened, study, None)) == []
-    section = shown("conduct", rows, level_kind="difference", unit="mN")
+    assert list(delivery.compute(replace(block(), stimulus=None), intervals_frame, study, None)) == []
+    section = statistic_with_rows("conduct", rows, level_kind="difference", unit="mN")
     assert cells(section) == [
         ["Standard [mN]", "trials", "repeated attempts", "measured", "mean level error [mN]", "largest",
          "RMS hand speed [m/s]", "apparent mass [kg]"],
@@ -202,7 +206,7 @@ def test_the_delivery_of_each_standard_counts_analysed_trials_and_averages_their
         ["8", "1", "2", "1", "−0.060", "0.060", "0.310", "–"],
         ["–", "1", "0", "1", "0.010", "0.010", "–", "–"],
     ]  # fmt: skip
-    assert cells(shown("conduct", [third], level_kind="weber", unit="mN"))[0][:4] == [
+    assert cells(statistic_with_rows("conduct", [third], level_kind="weber", unit="mN"))[0][:4] == [
         "trials", "repeated attempts", "measured", "mean level error",
     ]  # fmt: skip
     assert section.explanation() == (
@@ -210,8 +214,10 @@ def test_the_delivery_of_each_standard_counts_analysed_trials_and_averages_their
         "to the device, using the velocity estimator “kalman”. Some intervals exceeded a limit: slip in four intervals "
         "and pace error in three intervals."
     )
-    assert shown("conduct", [third]).explanation() == f"{LEVEL_ERROR} All intervals were within the limits."
-    assert shown("conduct", [{**third, "measured": 0}]).explanation() == (
+    assert (
+        statistic_with_rows("conduct", [third]).explanation() == f"{LEVEL_ERROR} All intervals were within the limits."
+    )
+    assert statistic_with_rows("conduct", [{**third, "measured": 0}]).explanation() == (
         f"{LEVEL_ERROR} The delivered levels were not measured, so it is not known whether they were within the limits."
     )
 
@@ -222,7 +228,7 @@ def test_a_session_is_excluded_if_more_catch_trials_than_the_limit_are_incorrect
         {"participant": person, "session": session, "n": 8, "wrong": wrong, "most": 0.25}
         for person, session, wrong in counts
     ]
-    assert cells(shown("catches", rows)) == [
+    assert cells(statistic_with_rows("catches", rows)) == [
         ["Participant", "session", "n", "incorrect", "percentage", "rule"],
         ["P001", "1", "8", "2", "25 %", "kept: at most 25 %"],
         ["P001", "3", "8", "3", "38 %", "excluded: more than 25 %"],
@@ -235,25 +241,32 @@ def test_the_force_held_back_is_given_for_comparisons_at_each_level_of_a_link() 
         (10.0, 20.0): (0.01, 0.03), (10.0, 40.0): (0.05,), (10.0, 60.0): (0.06, 0.41), (10.0, 80.0): (0.02,),
         (20.0, 50.0): (0.3,), **{(30.0, float(level)): (level / 1000,) for level in range(1, 10)},
     }  # fmt: skip
-    rows = [(standard, level, "comparison", "b", share) for (standard, level), held in shares.items() for share in held]
+    rows = [
+        (standard, level, "comparison", "b", share)
+        for (standard, level), withheld in shares.items()
+        for share in withheld
+    ]
     rows += [(10.0, 20.0, "standard", "b", 0.9), (10.0, 20.0, "comparison", "other", 0.8)]
     rows += [(10.0, 20.0, "comparison", "b", None), (10.0, None, "comparison", "b", 0.7)]
     frame = pd.DataFrame(rows, columns=["standard", "level", "presented", "block", "withheld_share"])
     study, withheld = SimpleNamespace(intervals=frame), keyed("withheld")
     unknown = frame[:2].assign(standard=np.nan)
-    found = list(withheld.compute(replace(block(), stimulus=LINK), None, study, None))
-    assert [list(row.values()) for row in found[:5]] == [
+    withheld_rows = list(withheld.compute(replace(block(), stimulus=LINK), None, study, None))
+    assert [list(row.values()) for row in withheld_rows[:5]] == [
         pytest.approx([10.0, 20.0, 20.0, 2, 2.0, 3.0]), pytest.approx([10.0, 40.0, 40.0, 1, 5.0, 5.0]),
         pytest.approx([10.0, 60.0, 60.0, 2, 23.5, 41.0]), pytest.approx([10.0, 80.0, 80.0, 1, 2.0, 2.0]),
         pytest.approx([20.0, 50.0, 50.0, 1, 30.0, 30.0]),
     ]  # fmt: skip
-    assert list(found[0]) == ["standard", "low", "high", "n", "mean_percent", "most_percent"]
-    assert [(row["low"], row["high"], row["n"]) for row in found[5:]] == [(1, 2, 2), *((n, n, 1) for n in range(3, 10))]
+    assert list(withheld_rows[0]) == ["standard", "low", "high", "n", "mean_percent", "most_percent"]
+    assert [(row["low"], row["high"], row["n"]) for row in withheld_rows[5:]] == [
+        (1, 2, 2),
+        *((n, n, 1) for n in range(3, 10)),
+    ]
     (row,) = withheld.compute(replace(block(), stimulus=LINK), None, SimpleNamespace(intervals=unknown), None)
     assert (row["standard"], row["n"]) == (None, 2)
     for stimulus in (None, STIMULUS):
         assert list(withheld.compute(replace(block(), stimulus=stimulus), None, study, None)) == []
-    section = shown("withheld", found, unit="ms")
+    section = statistic_with_rows("withheld", withheld_rows, unit="ms")
     table = cells(section)
     assert table[0] == ["Standard [ms]", "Level [ms]", "intervals", "mean", "maximum"]
     assert [table[3], table[6]] == [["10", "60", "2", "23.5 %", "41.0 %"], ["30", "1 – 2", "2", "0.2 %", "0.2 %"]]
@@ -263,8 +276,8 @@ def test_the_force_held_back_is_given_for_comparisons_at_each_level_of_a_link() 
         "at a standard of 20 ms, the safety layer held back more than 5 % of the force. In comparisons of up to 9 ms "
         f"at a standard of 30 ms, {never} The table shows"
     )
-    alone = [row | {"standard": None} for row in found[:1]]
-    assert shown("withheld", alone).explanation().startswith(f"In comparisons of up to 20, {never}")
+    alone = [row | {"standard": None} for row in withheld_rows[:1]]
+    assert statistic_with_rows("withheld", alone).explanation().startswith(f"In comparisons of up to 20, {never}")
 
 
 def test_the_mean_of_reversals_is_that_of_the_tracks_in_the_coordinate_of_the_stimulus(
@@ -299,11 +312,14 @@ def test_only_pairs_with_a_correct_answer_are_fitted_as_two_intervals(
 
 
 @pytest.mark.parametrize("design", ["abx", "samedifferent", "2ifc"])
-def test_a_trial_whose_intervals_are_still_sealed_is_not_analysed(design: str) -> None:
-    made = block(design, STIMULUS, ONE)
+def test_a_trial_with_sealed_intervals_is_not_analysed(design: str) -> None:
+    sealed_block = block(design, STIMULUS, ONE)
     intervals = pd.DataFrame(
-        {name: ["P001"] * made.design.intervals for name in ("participant", "session", "block", "trial", "attempt")}
-        | {"interval": range(1, made.design.intervals + 1)}
+        {
+            name: ["P001"] * sealed_block.design.intervals
+            for name in ("participant", "session", "block", "trial", "attempt")
+        }
+        | {"interval": range(1, sealed_block.design.intervals + 1)}
         | dict.fromkeys(("presented", "standard", "level", "catch", "setting"), pd.NA)
         | dict.fromkeys(("value_delivered", "delay_error_mean_ms", *tracks.OF_INTERVALS), np.nan)
     )
@@ -313,9 +329,9 @@ def test_a_trial_whose_intervals_are_still_sealed_is_not_analysed(design: str) -
         "code": ONE[0].code,
         "index": 4,
         "counted": True,
-        "response": next(iter(made.design.answers)),
+        "response": next(iter(sealed_block.design.answers)),
     }
-    found = tracks._track_row(made, presented | answered)
-    assert found["analysed"] is False
-    assert pd.isna(found["right"])
-    assert pd.isna(found["success"])
+    row = tracks._track_row(sealed_block, presented | answered)
+    assert row["analysed"] is False
+    assert pd.isna(row["right"])
+    assert pd.isna(row["success"])

@@ -43,8 +43,8 @@ DESIGNS = {
 }  # fmt: skip
 
 
-def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
-    """Return a block and what was found in it; each number that may be missing is so in a quarter of cases."""
+def random_block(number: int) -> tuple[LevelBlock, LevelsResult]:
+    """Return a random block and its results; each optional number is missing in a quarter of the cases."""
     rng = np.random.default_rng(number)
 
     def some(value: Any, share: float = 0.75) -> Any:
@@ -58,7 +58,10 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
     vary = "damping_nspm" if number % 4 == 0 else str(rng.choice(list(VARIED)))
     quantity, unit, ends, base = VARIED[vary]
     kind = "weber" if number % 4 == 0 else str(rng.choice(["weber", "difference", "value"]))
-    people = [f"P{one:03d}" for one in range(1, int(rng.choice([1, 2, 2, 3] if number < 18 else [2, 5, 15])) + 1)]
+    people = [
+        f"P{person_number:03d}"
+        for person_number in range(1, int(rng.choice([1, 2, 2, 3] if number < 18 else [2, 5, 15])) + 1)
+    ]
     standards = [None] if rng.random() < 0.2 else [base, 2 * base, 0.0][: int(rng.integers(2, 4))]
     levels = np.geomspace(*ends, int(rng.integers(1, 5))).round(3).tolist()
     catches, percent = bool(rng.random() < 0.3), some(75.0, 0.5)
@@ -109,7 +112,7 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
         n, value = int(rng.integers(1, 6)), around(ends[0] * 5)
         ends_ = (value * 0.8, value * 1.3)
         levels_ = tuple(around(value) for _ in range(n)) if person else ()
-        high = tuple(bool(one) for one in rng.integers(0, 2, n)) if person else ()
+        high = tuple(bool(is_above) for is_above in rng.integers(0, 2, n)) if person else ()
         error = None if standard is None else float(rng.normal(0, 0.1))
         low, high_end = some(ends_) or (None, None)
         return SettingEstimate(
@@ -159,20 +162,24 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
 
     whom = [None, *people]
     revealed = rng.random() < 0.9
-    found = LevelsResult(
+    level_result = LevelsResult(
         block="b",
         title="Block",
         design=design,
         revealed=revealed,
         times=tuple(
-            GroupAnswers(f"V{one}", f"standard {one}", {"n": one, "median": some(1.5), "q1": some(1.0), "q3": 2.0})
-            for one in range(2)
+            GroupAnswers(
+                f"V{interval_number}",
+                f"standard {interval_number}",
+                {"n": interval_number, "median": some(1.5), "q1": some(1.0), "q3": 2.0},
+            )
+            for interval_number in range(2)
         ),
         summary=summary,
         counts="correct" if design != "yesno" else "yes",
     )
     if not revealed:
-        return _block(design, vary, ends, standards, number), found
+        return _block(design, vary, ends, standards, number), level_result
     estimated = share and rng.random() < 0.8
     published = Published.model_construct(
         block="b",
@@ -192,9 +199,9 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
         "own_units": summary == "geometric mean" and bool(rng.random() < 0.5),
     }  # fmt: skip
     rows: dict[str, Any] = {
-        "thresholds": tuple(threshold(*one) for one in where) if estimated else (),
+        "thresholds": tuple(threshold(*whose) for whose in where) if estimated else (),
         "exponents": tuple(map(exponent, whom)) if estimated or summary == "geometric mean" else (),
-        "sensitivities": tuple(sensed(*one) for one in where) if share and rng.random() < 0.7 else (),
+        "sensitivities": tuple(sensed(*whose) for whose in where) if share and rng.random() < 0.7 else (),
         "withheld": tuple(
             {"standard": standard, "low": level, "high": level, "n": 4, "mean_percent": float(most) / 3,
              "most_percent": float(most)}
@@ -202,7 +209,8 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
         ) if vary == "delay_ms" else (),
         "conduct": tuple(map(run, standards)) if rng.random() < 0.8 else (),
         "catches": tuple(
-            {"participant": one, "session": 1, "n": 8, "wrong": int(rng.integers(0, 9)), "most": 0.5} for one in people
+            {"participant": person, "session": 1, "n": 8, "wrong": int(rng.integers(0, 9)), "most": 0.5}
+            for person in people
         ) if catches else (),
     }  # fmt: skip
     more |= {
@@ -214,55 +222,58 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
         ),
     }
     if summary == "settings":
-        rows["settings"] = tuple(set_by(*one) for one in where)
+        rows["settings"] = tuple(set_by(*whose) for whose in where)
     else:
         rows["answers"] = tuple(
             answered(person, standard, level, catch)
             for standard in standards for level in levels for catch in ((False, True) if catches else (False,))
             for person in whom if person is None or rng.random() < 0.9
         )  # fmt: skip
-    return _block(design, vary, ends, standards, number), replace(found, **more, statistics=rows)
+    return _block(design, vary, ends, standards, number), replace(level_result, **more, statistics=rows)
 
 
 def _block(design: str, vary: str, ends: Any, standards: list[Any], number: int) -> LevelBlock:
-    stimulus = Stimulus(vary=vary, levels=ends, standards=tuple(one for one in standards if one))
+    stimulus = Stimulus(vary=vary, levels=ends, standards=tuple(standard for standard in standards if standard))
     method = (Constant(), QuestPlus(), UpDown(rule="3down1up"), QuestPlus(learn="all"))[number % 4]
     kind = Rated(kind="rating", scale="s") if design == "rating" else default_design(design)
     return LevelBlock("b", "Block", "main", kind, stimulus, (), method)
 
 
 def lines_of(number: int) -> Iterator[str]:
-    made, found = filled(number)
+    block, level_result = random_block(number)
     failures = Failures()
     around = study(delays([0, 50]), list(everybody(delays([0, 50]), 3, lambda *_: 4)))
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", stub_png)
-        drawable = not Thresholds.participant_rows(found) or (
-            len({one.standard for one in Answers.rows_in(found)}) > 1 and not found.adaptive
+        drawable = not Thresholds.participant_rows(level_result) or (
+            len({counts.standard for counts in Answers.rows_in(level_result)}) > 1 and not level_result.adaptive
         )
-        pictures = list(draw_figures(level_figure_tasks(around, [found], ("png",)), failures)) if drawable else []
+        pictures = (
+            list(draw_figures(level_figure_tasks(around, [level_result], ("png",)), failures)) if drawable else []
+        )
     assert not failures.found, str(failures.found)
     for picture in pictures:
         yield from (picture.caption, *figure_words(picture.files["png"]))
-    yield from page_lines("".join(level_section(found, pictures, ("kalman", None)[number % 2])))
-    yield from level_findings(found)
-    yield from level_limits(found)
-    yield from level_methods([made], [found])
+    yield from page_lines("".join(level_section(level_result, pictures, ("kalman", None)[number % 2])))
+    yield from level_findings(level_result)
+    yield from level_limits(level_result)
+    yield from level_methods([block], [level_result])
 
 
 @pytest.mark.parametrize("part", [0, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_block_with_missing_numbers(part: int, pytestconfig: pytest.Config) -> None:
-    kept = GOLDEN / Path(f"levels-{part}.txt")
-    found = (line for number in range(6 * part, 6 * part + 6) for line in (f"== {number}", *lines_of(number)))
-    compare(kept, each_once(found), pytestconfig, mask=CHANGING)
+    golden_file = GOLDEN / Path(f"levels-{part}.txt")
+    all_lines = (line for number in range(6 * part, 6 * part + 6) for line in (f"== {number}", *lines_of(number)))
+    compare(golden_file, each_once(all_lines), pytestconfig, mask=CHANGING)
 
 
 CELLS = {
-    "thresholds": {"Standard": "standard", "threshold": "threshold", "95 % interval": "low high", "at": "compared",
-                   "width": "width", "flat width prior": "flat_width", "mean of reversals": "reversal_mean",
-                   "fit": "fit_p", "drift": "drift"},
+    "thresholds": {"Standard": "standard", "threshold": "threshold", "PSE": "threshold", "95 % interval": "low high",
+                   "at": "compared", "width": "width", "flat width prior": "flat_width",
+                   "mean of reversals": "reversal_mean", "fit": "fit_p", "drift": "drift"},
     "exponents": {"exponent": "exponent", "95 % interval": "low high"},
     "settings": {"Standard": "standard", "PSE": "pse", "95 % interval": "low high", "JND": "jnd",
+                 "mean setting": "pse", "SD": "jnd",
                  "constant error": "constant_error", "hysteresis": "hysteresis"},
     "sensitivities": {"d′": "d_prime", "95 % interval": "low high", "c": "criterion", "k": "criterion"},
     "conduct": {"Standard": "standard", "trials": "trials", "repeated attempts": "repeated", "measured": "measured",
@@ -274,7 +285,7 @@ CELLS = {
 """The numbers of a row that each column of the report's tables of levels shows."""
 OTHER_CELLS = {
     "Participant", "Standard", "Comparison", "Level", "levels", "standards", "n", "with device damping", "percentage",
-    "rule",
+    "rule", "JND",
 }  # fmt: skip
 """Columns with names, and those computed from several numbers."""
 NUMBER = re.compile(r"-?\d*\.?\d+(?:e[+-]\d+)?")
@@ -283,15 +294,15 @@ NUMBER = re.compile(r"-?\d*\.?\d+(?:e[+-]\d+)?")
 def test_each_column_of_a_table_of_levels_shows_its_number() -> None:
     checked = set()
     for number in range(36):
-        found = filled(number)[1]
+        level_result = random_block(number)[1]
         for statistic in statistics():
-            has_table = statistic.rows_in(found) and statistic.table_columns is not LevelStatistic.table_columns
-            shown = statistic(found).table_columns() if has_table else ()
-            for title, cell_of in (column for column in shown if column is not None):
+            has_table = statistic.rows_in(level_result) and statistic.table_columns is not LevelStatistic.table_columns
+            columns = statistic(level_result).table_columns() if has_table else ()
+            for title, cell_of in (column for column in columns if column is not None):
                 heading = re.sub(r" [\[(].*| [\d.]+ %$", "", title)
                 if (heading in OTHER_CELLS or heading[0] == "“") and heading not in CELLS.get(statistic.key, ()):
                     continue
-                for row in statistic.rows_in(found):
+                for row in statistic.rows_in(level_result):
                     values = [
                         row[name] if isinstance(row, dict) else getattr(row, name)
                         for name in CELLS[statistic.key][heading].split()
@@ -305,17 +316,17 @@ def test_each_column_of_a_table_of_levels_shows_its_number() -> None:
 def test_the_answers_at_a_level_are_percentages_only_if_they_are_proportions() -> None:
     checked = set()
     for number in range(24):
-        found = filled(number)[1]
-        answers = [row for row in Answers.rows_in(found) if row.participant is None and not row.catch]
-        if found.adaptive or not answers:
+        level_result = random_block(number)[1]
+        answers = [row for row in Answers.rows_in(level_result) if row.participant is None and not row.catch]
+        if level_result.adaptive or not answers:
             continue
-        page = "".join(Answers(found).section())
+        page = "".join(Answers(level_result).section())
         for row in answers:
             percentage, plain = f"{100 * row.value:.0f} %", f"{row.value:.3g}"
-            shown, other = (percentage, plain) if found.summary == "share" else (plain, percentage)
-            assert f">{shown}</td>" in page
+            expected, other = (percentage, plain) if level_result.summary == "share" else (plain, percentage)
+            assert f">{expected}</td>" in page
             assert f">{other}</td>" not in page or other in {f"{row.comparison:g}", f"{row.level:g}"}
-        checked.add(found.summary)
+        checked.add(level_result.summary)
     assert checked == {"share", "mean", "geometric mean"}
 
 
@@ -325,21 +336,21 @@ HAS_UNIT_OF_LEVELS = {"threshold": True, "pse": True, "exponent": False, "d_prim
 def test_each_sentence_of_the_first_page_on_levels_states_the_estimate_with_its_own_unit() -> None:
     checked = set()
     for number in range(60):
-        found = filled(number)[1]
-        if (estimates := estimates_of(found)) is None:
+        level_result = random_block(number)[1]
+        if (estimates := estimates_of(level_result)) is None:
             continue
-        attribute, is_weber = estimates.attribute, found.level_kind == "weber"
-        unit = f" {found.unit}" if HAS_UNIT_OF_LEVELS[attribute] and not is_weber else ""
+        attribute, is_weber = estimates.attribute, level_result.level_kind == "weber"
+        unit = f" {level_result.unit}" if HAS_UNIT_OF_LEVELS[attribute] and not is_weber else ""
         before = "a Weber fraction of " if HAS_UNIT_OF_LEVELS[attribute] and is_weber else ""
-        sentences = first_page._estimate_words(found, estimates.group, attribute, estimates.words)
+        sentences = first_page._estimate_sentences(level_result, estimates.group, attribute, estimates.words)
         for row, sentence in zip(estimates.group, sentences, strict=True):
             assert sentence.startswith(f"The mean {estimates.words} "), sentence
-            told = re.search(rf" was {before}(-?[\d.e-]+){unit} \((.+), n = (\d+)\)\.$", sentence.replace("−", "-"))
-            assert told is not None, sentence
-            assert float(told[1]) == pytest.approx(getattr(row, attribute), rel=0.01)
-            ends = [float(text) for text in NUMBER.findall(told[2].removeprefix("95 % "))]
+            match = re.search(rf" was {before}(-?[\d.e-]+){unit} \((.+), n = (\d+)\)\.$", sentence.replace("−", "-"))
+            assert match is not None, sentence
+            assert float(match[1]) == pytest.approx(getattr(row, attribute), rel=0.01)
+            ends = [float(text) for text in NUMBER.findall(match[2].removeprefix("95 % "))]
             assert ends == ([] if None in (row.low, row.high) else pytest.approx([row.low, row.high], rel=0.01))
-            assert int(told[3]) == getattr(row, "participants", row.n)
+            assert int(match[3]) == getattr(row, "participants", row.n)
             checked.add((attribute, is_weber))
     assert {attribute for attribute, _ in checked} == set(HAS_UNIT_OF_LEVELS)
     assert {("threshold", True), ("threshold", False), ("pse", True), ("pse", False)} <= checked

@@ -13,6 +13,7 @@ from study_app import figure_style as style
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.figures.level_figures import _draw_settings
 from study_app.analysis.levels.answers import SettingEstimate, Settings, setting_estimates
+from study_app.analysis.levels.statistic import digits
 from study_app.analysis.page_layout import Look
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results import LevelsResult
@@ -39,7 +40,7 @@ def block(stimulus: Stimulus = LOG, *, standard: bool = True) -> LevelBlock:
 def rows(*held: tuple[str, float, float], standard: float | None = 6.0) -> pd.DataFrame:
     """Return the rows of `tracks` of participant, starting level and setting."""
     frame = pd.DataFrame(held, columns=["participant", "level", "setting"])
-    return frame.assign(block="set", standard=standard, analysed=True, response="1")
+    return frame.assign(block="set", standard=standard, analysed=True, response="1", outcome="complete")
 
 
 def test_settings_that_do_not_count_and_trials_without_one_are_left_out() -> None:
@@ -48,6 +49,43 @@ def test_settings_that_do_not_count_and_trials_without_one_are_left_out() -> Non
     table["setting"] = table["setting"].astype("Float64").where(table["setting"].notna())
     _, a = setting_estimates(block(), table)
     assert a.levels == (5.0, 7.0)
+
+
+def setting_texts(standard: bool, *outcomes: str) -> tuple[str, str, list[str]]:
+    """Return the section, the limitations and the methods of settings at 2, 6 and 18 with these outcomes."""
+    table = rows(("A", 3.0, 2.0), ("A", 17.0, 6.0), ("B", 3.0, 18.0), standard=6.0 if standard else None)
+    set_block = block(standard=standard)
+    result = LevelsResult(
+        block="set", title="Set", design="adjustment", revealed=True, times=(), summary="settings", counts="",
+        quantity="damping", unit="N·s/m", level_kind="value", spacing="log",
+        statistics={Settings.key: tuple(setting_estimates(set_block, table.assign(outcome=outcomes)))},
+    )  # fmt: skip
+    settings = Settings(result)
+    methods = [*settings.methods(set_block), *Settings.common_methods([result])]
+    return "".join(settings.section()), " ".join(settings.limits()), methods
+
+
+def test_settings_without_a_standard_are_not_described_as_matches() -> None:
+    matched = " ".join(map(str, setting_texts(True, "complete", "complete", "complete")))
+    assert all(words in matched for words in ("PSE", "JND", "equal", "constant error", "point of subjective equality"))
+    section, limits, methods = setting_texts(False, "complete", "complete", "complete")
+    described = f"{section} {limits} {' '.join(methods)}"
+    assert not [words for words in ("PSE", "JND", "equal", "constant error", "standard and") if words in described]
+    assert "mean setting [N·s/m]" in section
+    assert "own criterion" in limits
+    assert "the mean of the settings, their standard deviation and the hysteresis" in methods[-1]
+
+
+def test_settings_that_timed_out_or_lie_at_an_end_of_the_range_are_counted() -> None:
+    section, limits, methods = setting_texts(True, "timeout", "complete", "complete")
+    counts = "1 of 3 settings was ended by the time limit and 2 lie at an end of the range"
+    assert f"Set: {counts}. They are included, so means may be biased and intervals too narrow." in limits
+    assert f"In “Set”, {counts}; these settings were included." in methods
+    assert "timed out" in section
+    assert "at an end of the range" in section
+    group, a, b = setting_estimates(block(), rows(("A", 3.0, 2.0), ("A", 17.0, 6.0), ("B", 3.0, 18.0)))
+    assert [(row.timed_out, row.at_ends) for row in (group, a, b)] == [(0, 2), (0, 1), (0, 1)]
+    assert [digits(value) for value in (-14.2, 70.7, None)] == ["−14.2", "70.7", "–"]
 
 
 @pytest.mark.parametrize(
@@ -91,45 +129,45 @@ def test_settings_are_drawn_with_their_mean_interval_and_the_standard_they_are_c
 
 
 @pytest.fixture(scope="module")
-def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sealed_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("matching")
     return rehearse_answers(matching_file(folder), participants=3, seed=3, results=folder / "study", features={})
 
 
 @pytest.fixture(scope="module")
-def study(sealed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def study(sealed_study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("opened") / "study"
-    shutil.copytree(sealed, folder)
+    shutil.copytree(sealed_study, folder)
     assert unblind(folder, "AB", "to analyse").left == ()
     return folder
 
 
 @pytest.fixture(scope="module")
-def reported(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report_folder(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     to = tmp_path_factory.mktemp("report")
     report(study, to, failed=pytest.fail)
     return to
 
 
-def test_r_computes_the_same_settings(reported: Path) -> None:
-    done = run_in_r(reported)
-    assert (done.returncode, done.stderr) == (0, "")
-    *_, counts, verdict = done.stdout.splitlines()
+def test_r_computes_the_same_settings(report_folder: Path) -> None:
+    process = run_in_r(report_folder)
+    assert (process.returncode, process.stderr) == (0, "")
+    *_, counts, verdict = process.stdout.splitlines()
     assert verdict == "all numbers that R computed agree with the report"
-    found, of = re.findall(r"\d+", counts)
-    assert found == of == "18"  # three people: PSE, two ends, JND, error, hysteresis
-    assert "matching, P002 at 6.0: hysteresis" in done.stdout
+    matching, of = re.findall(r"\d+", counts)
+    assert matching == of == "18"  # three people: PSE, two ends, JND, error, hysteresis
+    assert "matching, P002 at 6.0: hysteresis" in process.stdout
 
 
-@pytest.mark.usefixtures("figures_of_the_page")
-def test_before_unblinding_there_are_steps_and_no_level(sealed: Path, tmp_path: Path) -> None:
-    report(sealed, tmp_path, failed=pytest.fail)
+@pytest.mark.usefixtures("png_figures_only")
+def test_levels_are_not_written_before_unblinding(sealed_study: Path, tmp_path: Path) -> None:
+    report(sealed_study, tmp_path, failed=pytest.fail)
     assert not list(tmp_path.glob("settings-*"))
     assert not list(tmp_path.glob("*settings_data*"))
     text = (tmp_path / "report.html").read_text(encoding="utf-8") + (tmp_path / "report.json").read_text("utf-8")
-    key = read_key(sealed)
+    key = read_key(sealed_study)
     levels: list[Any] = []
-    for session in StudyFolder(sealed).sessions():
+    for session in StudyFolder(sealed_study).sessions():
         levels += [
             line["setting"] for line in raw(open_events(journal.read(session.journal), key)) if line.get("setting")
         ]

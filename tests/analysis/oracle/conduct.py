@@ -16,7 +16,8 @@ def compare_conduct(compared: Compared, answers: pd.DataFrame, trials: pd.DataFr
     own |= {"sessions_left_out": (~sessions.any(axis=1)).sum(), "sessions_excluded": sessions["excluded_session"].sum()}
     compared.check("study", own)
     counting, blocks = trials[trials["counts"]], compared.codebook["blocks"]
-    for number, (block, setting) in enumerate((one["id"], setting) for one in blocks for setting in one["settings"]):
+    settings_of_blocks = [(block["id"], setting) for block in blocks for setting in block["settings"]]
+    for number, (block, setting) in enumerate(settings_of_blocks):
         rows = counting[(counting["block"] == block) & (counting["code"] == setting["code"])]
         errors = rows["delay_error_mean_ms"].dropna().to_numpy(float)
         own = _validity(rows) | {"delay_ms": setting["delay_ms"], "measured": len(errors)}
@@ -25,11 +26,11 @@ def compare_conduct(compared: Compared, answers: pd.DataFrame, trials: pd.DataFr
             own |= {"achieved_ms": setting["delay_ms"] + errors.mean()}
         compared.check(f"results.delivered.{number}", own)
     _motion(compared, counting)
-    for number, asked in enumerate(compared.results.get("questions", ())):
-        rows = answers[answers["counts"] & (answers["form" if asked["is_form"] else "block"] == asked["where"])]
-        rows = rows[rows["item"] == asked["item"]]
-        places = rows["after_block"].fillna("0") if asked["is_form"] else rows["code"]
-        for place, group in enumerate(asked["groups"]):
+    for number, question in enumerate(compared.results.get("questions", ())):
+        rows = answers[answers["counts"] & (answers["form" if question["is_form"] else "block"] == question["where"])]
+        rows = rows[rows["item"] == question["item"]]
+        places = rows["after_block"].fillna("0") if question["is_form"] else rows["code"]
+        for place, group in enumerate(question["groups"]):
             own = _question(rows if group["code"] is None else rows[places == group["code"]], group["numbers"])
             compared.check(f"results.questions.{number}.groups.{place}.numbers", own)
 
@@ -39,8 +40,8 @@ def _validity(rows: pd.DataFrame) -> Numbers:
 
 
 def _motion(compared: Compared, counting: pd.DataFrame) -> None:
-    judged = {"judged": counting["valid"].notna().sum(), "invalid": counting["valid"].eq(False).sum()}
-    compared.check("results.performance", judged)
+    judgements = {"judged": counting["valid"].notna().sum(), "invalid": counting["valid"].eq(False).sum()}
+    compared.check("results.performance", judgements)
     measured = counting.assign(path_m=counting["path_length_m"])
     measured["at_limit_percent"] = 100 * counting["limiter_norm"] / counting["ticks"].replace(0, np.nan)
     table = read_csv(compared.folder / "motion.csv")
@@ -54,12 +55,12 @@ def _motion(compared: Compared, counting: pd.DataFrame) -> None:
 
 
 def _question(rows: pd.DataFrame, reported: Numbers) -> Numbers:
-    given, values, cannot = rows["response"].dropna(), rows["value"].dropna(), rows["cannot_judge"].eq(True).sum()
-    own = {"n": len(given), "participants": rows.loc[given.index, "participant"].nunique()}
-    own |= {"cannot_judge": cannot, "missing": len(rows) - len(given) - cannot}
+    responses, values, cannot = rows["response"].dropna(), rows["value"].dropna(), rows["cannot_judge"].eq(True).sum()
+    own = {"n": len(responses), "participants": rows.loc[responses.index, "participant"].nunique()}
+    own |= {"cannot_judge": cannot, "missing": len(rows) - len(responses) - cannot}
     if "counts" in reported:
-        chosen = [option for response in given.astype(str) for option in response.removesuffix(".0").split()]
-        own |= named("counts", {option: chosen.count(option) for option in reported["counts"]})
+        options = [option for response in responses.astype(str) for option in response.removesuffix(".0").split()]
+        own |= named("counts", {option: options.count(option) for option in reported["counts"]})
     if "values" in reported:
         own |= {"smallest": values.min(), "largest": values.max(), **named("values", enumerate(sorted(values)))}
     return own | (quartiles(values) if "median" in reported else {})
@@ -70,7 +71,7 @@ def compare_captions(compared: Compared, trials: pd.DataFrame) -> None:
     people, counting = trials[trials["here"]]["participant"].nunique(), trials[trials["counts"]]
     of_names = [own for (_, question, *_), own in compared.rows.items() if question == "liquids are recognised"]
     hits = [[own[name] for name in ("statistic", "expected", "p")] for own in of_names]
-    compared_people = [[one["n"]] for one in compared.results.get("contrasts", [])]
+    compared_people = [[contrast["n"]] for contrast in compared.results.get("contrasts", [])]
     measures = {block["id"]: pd.DataFrame(block["measures"]).sum() for block in compared.results["blocks"]}
     for path in compared.folder.glob("*.txt"):
         errors = counting.loc[counting["block"] == path.stem, "delay_error_mean_ms"]
@@ -84,8 +85,8 @@ def compare_captions(compared: Compared, trials: pd.DataFrame) -> None:
             ),
             (r"Correct: (\d+); (\S+) expected .* p = (\S+)\)", *hits),
         ):
-            for reported in (found.groups() for found in re.finditer(pattern, path.read_text("utf-8"))):
-                if not any(all(map(_is_rounded, reported, one)) for one in own):
+            for reported in (match.groups() for match in re.finditer(pattern, path.read_text("utf-8"))):
+                if not any(all(map(_is_rounded, reported, numbers)) for numbers in own):
                     compared.differences.append((path.name, reported, own))
 
 

@@ -48,10 +48,10 @@ class Model:
             return self.joint(values, mode[:, None] + np.array(steps))
 
         for _ in range(30):
-            slopes = np.stack([(at(h * one) - at(-h * one))[:, 0] / (2 * h) for one in units], axis=1)
+            slopes = np.stack([(at(h * unit) - at(-h * unit))[:, 0] / (2 * h) for unit in units], axis=1)
             curvature = np.array([
-                [(at(*[s * h * one + r * h * other for s, r in sides]) @ [s * r for s, r in sides]) for other in units]
-                for one in units
+                [(at(*[s * h * unit + r * h * over for s, r in sides]) @ [s * r for s, r in sides]) for over in units]
+                for unit in units
             ]).transpose(2, 0, 1) / (4 * h * h)  # fmt: skip
             step = np.linalg.solve(curvature, slopes[..., None])[..., 0]
             mode = mode - step * np.minimum(1, 1 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-9))
@@ -85,8 +85,8 @@ class Model:
         free = [i for i in range(len(values)) if i < len(values) - self.sds or abs(values[i]) > 1e-2]
         steps, sides = 1e-3 * np.eye(len(values))[free], [*product((1, -1), repeat=2)]
         curvature = np.array([
-            [sum(s * r * self.log_likelihood(values + s * one + r * other) for s, r in sides) for other in steps]
-            for one in steps
+            [sum(s * r * self.log_likelihood(values + s * step + r * across) for s, r in sides) for across in steps]
+            for step in steps
         ]) / 4e-6  # fmt: skip
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(-curvature)))[self.k - 1 : self.k - 1 + self.effects])
 
@@ -97,8 +97,18 @@ def counts(rows: pd.DataFrame, conditions: int) -> Numbers:
     return own | {"p": math.nan}
 
 
+_FITS: dict[tuple[str, bytes, str | None, bool], Numbers] = {}
+
+
 def fitted(rows: pd.DataFrame, design: Floats, direction: str | None, *, slopes: bool) -> Numbers:
-    """Return the numbers of a model that is compared with the one without effects."""
+    """Return the statistics of a model, compared with the model without effects; equal answers are fitted once."""
+    key = (rows[["participant", "place", "response"]].to_csv(index=False), design.tobytes(), direction, slopes)
+    if key not in _FITS:
+        _FITS[key] = _fit(rows, design, direction, slopes=slopes)
+    return _FITS[key]
+
+
+def _fit(rows: pd.DataFrame, design: Floats, direction: str | None, *, slopes: bool) -> Numbers:
     model = Model(rows, design, slopes=slopes)
     values, most = model.maximum()
     cuts, effects, sds = np.split(values, [model.k - 1, model.k - 1 + model.effects])

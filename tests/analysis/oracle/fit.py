@@ -24,14 +24,14 @@ PRIOR = stats.norm.pdf(np.log(WIDTHS), MEDIAN, FACTOR)[:, None] * LAPSE_PRIOR
 
 
 def rise(design: str, distance: Floats) -> Floats:
-    """Return the share of the rise of a Weibull function (2ifc) or a normal one, so many widths above the threshold."""
+    """Return the fraction of the rise of a Weibull (2ifc) or normal function at a distance from the threshold."""
     if design == "yesno":
         return np.asarray(special.ndtr(2 * stats.norm.ppf(0.95) * distance))
     return np.asarray(-np.expm1(-math.log(2) * 10 ** np.minimum(KAPPA * distance, 300)))
 
 
 class Fit:
-    """What the answers of a person at one standard say, in ``weights`` under a flat prior on the width."""
+    """The posterior of one person's answers at one standard; ``weights`` has a flat prior on the width."""
 
     def __init__(self, rows: pd.DataFrame, design: str, ends: Sequence[float]) -> None:
         placed = rows.groupby("level")["delivered"].transform("mean").fillna(rows["level"]).to_numpy(float)
@@ -49,7 +49,7 @@ class Fit:
         self.weights = self._posterior(CHANGE_SD * np.linspace(-2.5, 2.5, 9), LAPSE_PRIOR)
 
     def score(self, weights: Floats, course: Floats) -> Floats:
-        """Return score and information, at none, of a threshold that takes this course over the trials."""
+        """Return the score and information, at zero, of a threshold that follows this course over the trials."""
         step, psi = STEP * self.medians(weights)[1], self.expected(weights)
         slope = (self.expected(weights, step) - self.expected(weights, -step)) / (2 * step)
         course = course - np.average(course, weights=slope**2 / (psi * (1 - psi)) + 1e-300)
@@ -77,11 +77,11 @@ class Fit:
         return float(np.interp(share, np.append(0, np.cumsum(weights.sum(axis=(1, 2, 3)))), edges))
 
     def medians(self, weights: Floats) -> list[float]:
-        found = [self.quantile(weights, 0.5)]
+        medians_of_grid = [self.quantile(weights, 0.5)]
         for axis, values in ((1, WIDTHS), (2, LAPSES), (3, GUESSES[self.design])):
             of_axis = weights.sum(axis=tuple({0, 1, 2, 3} - {axis}))
-            found.append(float(np.interp(0.5, np.cumsum(of_axis) - of_axis / 2, values)))
-        return found
+            medians_of_grid.append(float(np.interp(0.5, np.cumsum(of_axis) - of_axis / 2, values)))
+        return medians_of_grid
 
     def expected(self, weights: Floats, further: float = 0.0) -> Floats:
         """Return the probability of success of each answer, of a threshold that is so much higher."""
@@ -93,18 +93,18 @@ class Fit:
     def _preferences(self, rows: pd.DataFrame, weights: Floats) -> Floats:
         """Return how far preferences move each decision, by a probit regression with lapses and a prior."""
         towards = rows["order"].map({"cs": 1.0, "sc": -1.0}).to_numpy()
-        said, lapse, self.shifts = np.where(self.success, towards, -towards), self.medians(weights)[2], 0 * self.u
+        signs, lapse, self.shifts = np.where(self.success, towards, -towards), self.medians(weights)[2], 0 * self.u
         sensed = towards * special.ndtri(np.clip((self.expected(weights) - lapse) / (1 - 2 * lapse), 0.5, 0.999))
-        causes = np.column_stack([np.ones(len(said)), rows["before"]])
+        causes = np.column_stack([np.ones(len(signs)), rows["before"]])
 
         def loss(mode: Floats) -> float:
-            shares = lapse + (1 - 2 * lapse) * special.ndtr(said * (sensed + causes @ mode))
+            shares = lapse + (1 - 2 * lapse) * special.ndtr(signs * (sensed + causes @ mode))
             return float(mode @ mode / 2 / PREFERENCE_SD**2 - np.log(shares).sum())
 
         mode = optimize.minimize(loss, np.zeros(2), tol=1e-10).x
         return np.asarray(towards * np.round(causes @ mode, 1))
 
-    def under(self, prior: Floats) -> tuple[Floats, float]:
+    def weights_under(self, prior: Floats) -> tuple[Floats, float]:
         """Return the weights under a prior on width and lapse rate, and the variance of the threshold."""
         weights = self.weights * (prior / LAPSE_PRIOR)[..., None]
         weights /= weights.sum()
@@ -112,7 +112,7 @@ class Fit:
         return weights, float(marginal @ (self.thresholds - marginal @ self.thresholds) ** 2) + self.sd**2
 
     def numbers(self, prior: Floats) -> Numbers:
-        weights, variance = self.under(prior)
+        weights, variance = self.weights_under(prior)
         (threshold, width, lapse, guess), psi = self.medians(weights), self.expected(weights)
         ends = [math.hypot(self.quantile(weights, end) - threshold, Z_95 * self.sd) for end in (0.025, 0.975)]
         residuals = np.sign(self.success - psi) * np.sqrt(-2 * np.log(np.where(self.success, psi, 1 - psi)))
@@ -130,7 +130,7 @@ def preferred(unbiased: Floats, lapse: Floats | float, shift: Floats | float) ->
 
 
 def group_priors(fits: Sequence[Fit]) -> tuple[Floats, Floats]:
-    """Return each person's prior on width and lapse rate by the others' answers, and the ends of a common error."""
+    """Return each person's prior on width and lapse rate from the others' answers, and the bounds of a common error."""
     widths, thresholds = np.log(WIDTHS), fits[0].thresholds
     of_width = stats.norm.pdf(widths, widths[:, None], ALIKE * FACTOR)
     of_width /= of_width.sum(axis=1, keepdims=True)

@@ -19,15 +19,15 @@ MEASURED = ["pace_mps", "apparent_mass_kg"]
 
 
 def compare_levels(compared: Compared, answers: pd.DataFrame, intervals: pd.DataFrame, study: Numbers) -> None:
-    """Recompute the numbers of all blocks of levels of a study, given by its file."""
-    for number, found in enumerate(compared.results["levels"]):
-        place, key, design = f"results.levels.{number}", found["block"], found["design"]
+    """Recompute the numbers of all blocks of levels from the study file and its tables."""
+    for number, level_result in enumerate(compared.results["levels"]):
+        place, key, design = f"results.levels.{number}", level_result["block"], level_result["design"]
         block = study["blocks"][key]
         stimulus, wrong = study["stimuli"][block["stimulus"]], block.get("catch", {}).get("wrong_most")
         here = [rows[(rows["block"] == key) & rows["counts"]] for rows in (intervals, answers)]
         rows = _trials(*here, design, stimulus.get("level", "weber"))
         compared.check(place, {"guess_rate": 0.5 if design == "2ifc" else math.nan})
-        for which, times in enumerate(found["times"]):
+        for which, times in enumerate(level_result["times"]):
             seconds = rows.loc[rows["code"] == times["code"], "response_s"]
             compared.check(f"{place}.times.{which}.numbers", {"n": len(seconds), **quartiles(seconds)})
         parts = {"answers": _answers(rows, design), "conduct": _delivery(rows), "catches": []}
@@ -39,14 +39,16 @@ def compare_levels(compared: Compared, answers: pd.DataFrame, intervals: pd.Data
             parts |= {"sensitivities": _sensitivities(rows, design), "thresholds": _thresholds(fits)}
         parts["exponents"] = _exponents(parts.get("thresholds", parts["answers"]))
         for name, lines in parts.items():
-            assert len(lines) == len(found[name]), f"{place}.{name}: {len(found[name])} rows, recomputed {len(lines)}"
+            assert len(lines) == len(level_result[name]), (
+                f"{place}.{name}: {len(level_result[name])} rows, recomputed {len(lines)}"
+            )
             for line, own in enumerate(lines):
                 compared.check(f"{place}.{name}.{line}", own, 1e-4)
             compared.values[key, name] = pd.DataFrame(line for line in lines if "_person" in line)
 
 
 def _trials(intervals: pd.DataFrame, answers: pd.DataFrame, design: str, kind: str) -> pd.DataFrame:
-    """Return a row a trial: what was presented, what was delivered, and the answer."""
+    """Return one row per trial: presented level, delivered level, and answer."""
     ordered = intervals.sort_values([*TRIAL, "interval"])
     delivered = ordered.pivot_table(index=TRIAL, columns="presented", values="value_delivered")
     rows = ordered.groupby(TRIAL)[["standard", "level", "catch", "code"]].first()
@@ -56,21 +58,25 @@ def _trials(intervals: pd.DataFrame, answers: pd.DataFrame, design: str, kind: s
     if kind == "weber":
         standard = rows["standard"] if design == "yesno" else delivered["standard"]
         rows["comparison"], rows["delivered"] = rows["standard"] * (1 + rows["level"]), rows["delivered"] / standard - 1
-    given = answers.assign(response_s=(answers["first_choice_s"] - answers["onset_s"]).round(6)).set_index(TRIAL)
-    rows = rows.join(given[["response", "value", "response_s"]], how="inner").dropna(subset="response")
+    timed_answers = answers.assign(response_s=(answers["first_choice_s"] - answers["onset_s"]).round(6)).set_index(
+        TRIAL
+    )
+    rows = rows.join(timed_answers[["response", "value", "response_s"]], how="inner").dropna(subset="response")
     rows = rows.sort_index().reset_index()
     rows["right"] = rows["response"] == rows["order"].map(ANSWERS.get(design, {}))
     rows["success"] = rows["response"] == "yes" if design == "yesno" else rows["right"]
-    said = rows["response"].map({"first": 1.0, "second": -1.0}).fillna(0.0)
-    return rows.assign(before=said.groupby([rows[name] for name in SESSION]).shift(fill_value=0.0))
+    signs = rows["response"].map({"first": 1.0, "second": -1.0}).fillna(0.0)
+    return rows.assign(before=signs.groupby([rows[name] for name in SESSION]).shift(fill_value=0.0))
 
 
 def _delivery(rows: pd.DataFrame) -> list[Numbers]:
     lines = []
     for standard, own in rows.groupby("standard", dropna=False):
         errors = (own["delivered"] - own["level"])[own["level"] != 0].dropna()
-        found = {"standard": standard, "trials": len(own), "repeated": 0, "measured": len(errors)}
-        lines.append(found | {"error_mean": errors.mean(), "error_largest": errors.abs().max(), **own[MEASURED].mean()})
+        delivery = {"standard": standard, "trials": len(own), "repeated": 0, "measured": len(errors)}
+        lines.append(
+            delivery | {"error_mean": errors.mean(), "error_largest": errors.abs().max(), **own[MEASURED].mean()}
+        )
     return lines
 
 
@@ -87,10 +93,17 @@ def _answers(rows: pd.DataFrame, design: str) -> list[Numbers]:
         own = [where | {"n": len(here), "participants": len(people), "value": means.mean(), **student(means)}]
         ends = {end: np.clip(own[0][end], 0, 1) for end in ("low", "high")}
         own[0] |= ends | {"count": here["success"].sum()} if is_share else {}
-        for person, one in people:
-            own.append(where | {"n": len(one), "participants": 1, "value": one["number"].mean(), "_person": person})
-            count, hidden = one["success"].sum(), {"_delivered": one["delivered"].mean()}
-            own[-1] |= {"count": count, **exact_share(count, len(one))} if is_share else student(one["number"]) | hidden
+        for person, person_rows in people:
+            own.append(
+                where
+                | {"n": len(person_rows), "participants": 1, "value": person_rows["number"].mean(), "_person": person}
+            )
+            count, hidden = person_rows["success"].sum(), {"_delivered": person_rows["delivered"].mean()}
+            own[-1] |= (
+                {"count": count, **exact_share(count, len(person_rows))}
+                if is_share
+                else student(person_rows["number"]) | hidden
+            )
         for line in own if not is_share else ():
             line |= {name: math.exp(line[name]) for name in ("value", "low", "high")}
         lines += own
@@ -99,22 +112,26 @@ def _answers(rows: pd.DataFrame, design: str) -> list[Numbers]:
 
 def _sensitivities(rows: pd.DataFrame, design: str) -> list[Numbers]:
     """Return d′ and c of all and of each, from rates with the log-linear correction (Hautus 1995)."""
-    (_, said), *_ = ANSWERS[design].items()
+    (_, second_answer), *_ = ANSWERS[design].items()
     root, lines = math.sqrt(2 if design == "2ifc" else 1), []
     for standard, here in rows.groupby("standard"):
         own = []
-        for person, one in here.groupby("participant"):
-            sides = [one.loc[one["order"] == order, "response"] == said for order in ANSWERS[design]]
+        for person, person_rows in here.groupby("participant"):
+            sides = [
+                person_rows.loc[person_rows["order"] == order, "response"] == second_answer for order in ANSWERS[design]
+            ]
             n = np.array([*map(len, sides)])
             rates = (np.array([*map(sum, sides)]) + 0.5) / (n + 1)
             z = stats.norm.ppf(rates)
             variance, d_prime = (rates * (1 - rates) / n / stats.norm.pdf(z) ** 2).sum(), (z[0] - z[1]) / root
             reach = Z_95 * math.sqrt(variance) / root
-            shares = {answer: (one["response"] == answer).mean() for answer in ANSWERS[design].values()}
-            found = {"d_prime": d_prime, "low": d_prime - reach, "high": d_prime + reach, "criterion": -z.mean()}
-            own.append(found | named("shares", shares) | {"n": len(one), "standard": standard, "_person": person})
+            shares = {answer: (person_rows["response"] == answer).mean() for answer in ANSWERS[design].values()}
+            mean_row = {"d_prime": d_prime, "low": d_prime - reach, "high": d_prime + reach, "criterion": -z.mean()}
+            own.append(
+                mean_row | named("shares", shares) | {"n": len(person_rows), "standard": standard, "_person": person}
+            )
         means = pd.DataFrame(own).drop(columns="_person").mean()
-        lines += [{**means, **student(one["d_prime"] for one in own), "n": len(own)}, *own]
+        lines += [{**means, **student(row["d_prime"] for row in own), "n": len(own)}, *own]
     return lines
 
 
@@ -130,7 +147,7 @@ def _thresholds(fits: dict[tuple[float, str], Fit]) -> list[Numbers]:
         score, information = table["_early"].sum()
         group = {"threshold": 10**mean, "low": 10 ** (mean - low), "high": 10 ** (mean + high), "standard": standard}
         lines += [group | {"n": len(own), "early_change": score / math.sqrt(information)}]
-        lines += [one | {"_person": person} for person, one in zip(people, own, strict=True)]
+        lines += [estimate | {"_person": person} for person, estimate in zip(people, own, strict=True)]
     return lines
 
 
@@ -139,11 +156,11 @@ def _exponents(lines: Sequence[Numbers]) -> list[Numbers]:
     table, own = pd.DataFrame(line for line in lines if "_person" in line), []
     if "threshold" in table:
         table = table.assign(_delivered=table["standard"], value=table["threshold"] * table["standard"])
-    for person, one in table.groupby("_person"):
-        if len(one) > 1:
-            slope = np.polyfit(np.log(one["_delivered"]), np.log(one["value"]), 1)[0]
-            own.append({"exponent": slope, "n": len(one), "_person": person})
-    slopes = [one["exponent"] for one in own]
+    for person, person_rows in table.groupby("_person"):
+        if len(person_rows) > 1:
+            slope = np.polyfit(np.log(person_rows["_delivered"]), np.log(person_rows["value"]), 1)[0]
+            own.append({"exponent": slope, "n": len(person_rows), "_person": person})
+    slopes = [row["exponent"] for row in own]
     return [{"exponent": np.mean(slopes), "n": len(own), **student(slopes)}, *own] if own else []
 
 
@@ -152,7 +169,7 @@ def compare_hypotheses(compared: Compared, trials: pd.DataFrame, study: Numbers)
     reported, contrasts = compared.results.get("contrasts", []), study["analysis"].get("contrasts", [])
     rows = compared.tests()
     tested = [_tested(compared, contrast, trials[trials["here"]]) for contrast in contrasts]
-    others = [max(one["p_bootstrap"], one["p_skewed"]) for one in reported]
+    others = [max(test["p_bootstrap"], test["p_skewed"]) for test in reported]
     ps = adjusted([max(own["p"], p) for own, p in zip(tested, others, strict=True)])
     for number, (own, p) in enumerate(zip(tested, ps, strict=True)):
         own.update(p_adjusted=p, members=len(contrasts), **_limits(contrasts, number, study["analysis"]))
@@ -161,7 +178,7 @@ def compare_hypotheses(compared: Compared, trials: pd.DataFrame, study: Numbers)
 
 
 def _limits(contrasts: Sequence[Numbers], number: int, analysis: Numbers) -> Numbers:
-    """Return the largest difference of a person, and how many people include one of each minority that matters."""
+    """Return the largest individual difference, and the sample size that includes one of each relevant minority."""
     contrast, bounds = contrasts[number], sum("bound" in contrast for contrast in contrasts)
     is_statement = contrast["measure"] not in ("threshold", "exponent", "d_prime", "pse") and "form" not in contrast
     limits = {"largest": 6} if is_statement else {}
@@ -184,7 +201,7 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
     else:
         variance = sides[0]["variance"] + sides[1]["variance"]
         samples = [pd.DataFrame({"value": sides[0]["value"] - sides[1]["value"], "variance": variance}).dropna()]
-    mean_of = random_effects if ratio else lambda one: (one["value"].mean(), stats.sem(one["value"]))
+    mean_of = random_effects if ratio else lambda sample: (sample["value"].mean(), stats.sem(sample["value"]))
     means, errors = zip(*map(mean_of, samples), strict=True)
     mean, error, freedom = means[0] - sum(means[1:]), math.hypot(*errors), min(map(len, samples)) - 1
     t, scale = stats.t(freedom), math.exp if ratio else float
@@ -196,14 +213,17 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
     own |= named("interval", {"low": scale(mean - reach), "high": scale(mean + reach), "level": 0.95})
     if not groups:
         own |= {"higher": (samples[0]["value"] > 0).sum(), "sd": samples[0]["value"].std()}
-    held = samples if groups else [side.loc[samples[0].index] for side in sides]
-    for number, (middle, spread) in enumerate(map(mean_of, held)):
-        values, reach = held[number]["value"], stats.t.ppf(0.975, len(held[number]) - 1) * spread
+    compared_samples = samples if groups else [side.loc[samples[0].index] for side in sides]
+    for number, (middle, spread) in enumerate(map(mean_of, compared_samples)):
+        values, reach = (
+            compared_samples[number]["value"],
+            stats.t.ppf(0.975, len(compared_samples[number]) - 1) * spread,
+        )
         side = {"mean": scale(middle), "low": scale(middle - reach), "high": scale(middle + reach), "sd": values.std()}
         people = {str(who): scale(value) for who, value in values.items()}
         side["standard_error"] = spread
         own |= named(f"sides.{number}", side) | named(f"sides.{number}.values", people)
-    return own | _standardised([one["value"].to_numpy() for one in samples])
+    return own | _standardised([sample["value"].to_numpy() for sample in samples])
 
 
 def _standardised(samples: Sequence[Any]) -> Numbers:
@@ -238,7 +258,7 @@ def _in_ln(compared: Compared, contrast: Numbers) -> list[pd.DataFrame]:
     for standard in {standard for standard, _ in fits[0]}:
         people = [(side, who, fit) for side, own in enumerate(fits) for (at, who), fit in own.items() if at == standard]
         for (side, person, fit), prior in zip(people, group_priors([fit for *_, fit in people])[0], strict=True):
-            weights, variance = fit.under(prior)
+            weights, variance = fit.weights_under(prior)
             lines.append((side, person, math.log(10) * fit.medians(weights)[0], math.log(10) ** 2 * variance))
     table = pd.DataFrame(lines, columns=["side", "person", "value", "variance"]).groupby(["side", "person"])
     means = pd.DataFrame({"value": table["value"].mean(), "variance": table["variance"].sum() / table.size() ** 2})

@@ -29,7 +29,7 @@ class Compared:
     """
 
     def __init__(self, folder: Path) -> None:
-        report, self.codebook = (json.loads((folder / f"{one}.json").read_bytes()) for one in ("report", "codebook"))
+        report, self.codebook = (json.loads((folder / f"{name}.json").read_bytes()) for name in ("report", "codebook"))
         self.folder, self.results, self.numbers = folder, report["results"], dict(leaves(report))
         self.places, self.differences = set[str](), list[tuple[str, Any, Any]]()
         self.rows, self.values = dict[tuple[str, ...], Numbers](), dict[tuple[str, str], Any]()
@@ -71,14 +71,14 @@ def read_csv(path: Path) -> pd.DataFrame:
 
 
 def read_table(folder: Path, name: str, study: Path) -> pd.DataFrame:
-    """Read an exported table; what is excluded is read from the list in the study's own folder.
+    """Read an exported table; read exclusions from the list in the study folder.
 
     ``here`` are the rows of complete sessions that are not excluded, ``kept`` those whose trial is not excluded either,
     ``counts`` of these answers to forms, and last attempts at main trials.
     """
     (path,) = folder.glob(f"*_description-{name}_data.csv")
-    rows, listed = read_csv(path), study / "exclusions.csv"
-    excluded = read_csv(listed) if listed.exists() else pd.DataFrame(columns=TRIAL)
+    rows, exclusion_list = read_csv(path), study / "exclusions.csv"
+    excluded = read_csv(exclusion_list) if exclusion_list.exists() else pd.DataFrame(columns=TRIAL)
     parts = (SESSION, excluded[excluded["trial"].isna()]), (TRIAL, excluded.dropna(subset="trial"))
     of_session, of_trial = (rows.set_index(keys).index.isin(some.set_index(keys).index) for keys, some in parts)
     here = rows["session_status"].isin(["completed", "incomplete"]) & ~of_session

@@ -20,16 +20,20 @@ class Block:
 
     def __init__(self, compared: Compared, number: int, answers: pd.DataFrame, gate: float) -> None:
         self.compared, self.place, self.gate = compared, f"results.blocks.{number}", gate
-        found, decided = compared.results["blocks"][number], compared.results["decided"]
-        settings = next(one["settings"] for one in compared.codebook["blocks"] if one["id"] == found["id"])
+        block_found, decided = compared.results["blocks"][number], compared.results["decided"]
+        settings = next(block["settings"] for block in compared.codebook["blocks"] if block["id"] == block_found["id"])
         self.codes, self.delays = ([setting[name] for setting in settings] for name in ("code", "delay_ms"))
-        self.answers = answers[(answers["block"] == found["id"]) & answers["counts"]]
-        people, self.found, self.wide = sorted(self.answers["participant"].unique()), found, dict[str, pd.DataFrame]()
-        for item in (one["id"] for one in found["items"]):
+        self.answers = answers[(answers["block"] == block_found["id"]) & answers["counts"]]
+        people, self.found, self.wide = (
+            sorted(self.answers["participant"].unique()),
+            block_found,
+            dict[str, pd.DataFrame](),
+        )
+        for item in (item["id"] for item in block_found["items"]):
             own = self.answers[self.answers["item"] == item].groupby(["participant", "code"])["response"].median()
             self.wide[item] = own.unstack("code").reindex(people)[self.codes]
             conditions = {setting["code"]: setting["condition"] for setting in settings}
-            compared.values[found["id"], item] = self.wide[item].rename(columns=conditions)
+            compared.values[block_found["id"], item] = self.wide[item].rename(columns=conditions)
         self.primary = [item for item in self.wide if item in (decided["primary"] or self.wide)]
         self.sides = dict.fromkeys(decided["rising"], "greater") | dict.fromkeys(decided["falling"], "less")
 
@@ -52,7 +56,7 @@ class Block:
 def compare_statements(compared: Compared, answers: pd.DataFrame, trials: pd.DataFrame) -> None:
     answers = answers[answers["kind"] == "statement"] if "kind" in answers else answers
     answers = answers.assign(response=pd.to_numeric(answers["response"], errors="coerce"))
-    gates = adjusted([(found["overall"] or {}).get("p") for found in compared.results["blocks"]])
+    gates = adjusted([(block_result["overall"] or {}).get("p") for block_result in compared.results["blocks"]])
     for number, gate in enumerate(gates):
         block = Block(compared, number, answers, gate)
         own, noticed = block.found, compared.results["decided"]["noticed"]
@@ -73,12 +77,12 @@ def compare_statements(compared: Compared, answers: pd.DataFrame, trials: pd.Dat
 def adjusted(ps: Sequence[float | None], method: str = "holm") -> list[float]:
     """Return adjusted p; a test without p is a member of the family."""
     known = np.array([math.nan if p is None else p for p in ps], float)
-    found = multipletests(np.nan_to_num(known, nan=1.0), method=method)[1] if len(known) else known
-    return list(np.where(np.isnan(known), math.nan, found))
+    corrected = multipletests(np.nan_to_num(known, nan=1.0), method=method)[1] if len(known) else known
+    return list(np.where(np.isnan(known), math.nan, corrected))
 
 
 def share_of_sums(people: Iterable[Iterable[float]], total: float) -> float:
-    """Return the share of choices of one value of each person whose sum is at least ``total``, exact to quarters."""
+    """Return the exact fraction of choices, one value per person, whose sum is at least ``total``."""
     chance, least = np.ones(1), 0
     for values in people:
         steps = np.rint(4 * np.array([*values])).astype(int)
@@ -104,10 +108,10 @@ def signed_ranks(all_differences: pd.Series) -> Numbers:
 
 
 def _measures(block: Block, trials: pd.DataFrame) -> None:
-    given = block.answers.dropna(subset="response")
-    times = given.groupby(["item", "participant", "code"]).size()
+    responses = block.answers.dropna(subset="response")
+    times = responses.groupby(["item", "participant", "code"]).size()
     own = {"n": block.answers["participant"].nunique(), **named("presentations", enumerate([times.min(), times.max()]))}
-    own |= named("sessions", enumerate(sorted(given["session"].unique())))
+    own |= named("sessions", enumerate(sorted(responses["session"].unique())))
     block.compared.check(block.place, own | {f"settings.{at}.delay_ms": ms for at, ms in enumerate(block.delays)})
     last = trials[trials["here"] & (trials["attempt"] == trials["last_attempt"])]
     for number, (code, item) in enumerate(product(block.codes, block.wide)):
@@ -125,14 +129,17 @@ def _measures(block: Block, trials: pd.DataFrame) -> None:
 
 
 def _settings_differ(block: Block) -> None:
-    """Test each statement, and all at once: there p is drawn, and the smallest p follows from the number of draws."""
+    """Test each statement and all at once; the p over all is drawn, so that its minimum depends on the draws."""
     whole = {item: answers.dropna() for item, answers in block.wide.items()}
     people, k = set[str]().union(*(answers.index for answers in whole.values())), len(block.codes)
     tested = [(_friedman(answers), len(answers)) for answers in whole.values() if answers.nunique(axis=1).max() > 1]
     method = block.found["overall"]["method"].split()
     draws = int(method[3]) if "draws," in method else math.inf
     own = {"n": len(people), "dropped": len(block.wide[next(iter(whole))]) - len(people), "items": len(tested)}
-    own |= {"statistic": sum(one for one, _ in tested), "effect": np.mean([one / n / (k - 1) for one, n in tested])}
+    own |= {
+        "statistic": sum(statistic for statistic, _ in tested),
+        "effect": np.mean([statistic / n / (k - 1) for statistic, n in tested]),
+    }
     own |= {"incomplete": len(people) * len(whole) - sum(map(len, whole.values()))}
     own |= {"smallest_p": max(1 / (1 + draws), math.factorial(k) ** (1.0 - len(people)))}
     block.record("overall", own, "conditions differ, all statements")
@@ -141,7 +148,9 @@ def _settings_differ(block: Block) -> None:
     slopes = {item: _slopes(answers, design, block.sides.get(item)) for item, answers in block.wide.items()}
     block.record_family("mixed", "means differ", slopes, explored=True)
     if not delays:
-        block.record_family("omnibus", "conditions differ", {item: _alike(one) for item, one in block.wide.items()})
+        block.record_family(
+            "omnibus", "conditions differ", {item: _alike(answers) for item, answers in block.wide.items()}
+        )
 
 
 def _cumulative_models(block: Block) -> None:
@@ -151,7 +160,7 @@ def _cumulative_models(block: Block) -> None:
     delays = block.found["kind"] == "delays"
     design = np.array(block.delays)[:, None] / 100 if delays else np.eye(len(place))[:, 1:]
     outcomes = {}
-    for item, model in ((one["item"], one["outcome"]) for one in block.found["cumulative"]):
+    for item, model in ((model["item"], model["outcome"]) for model in block.found["cumulative"]):
         own = rows[rows["item"] == item]
         if not delays:
             own = own.groupby(["participant", "place"], as_index=False)["response"].median()
@@ -195,35 +204,35 @@ def _rank_sums(ranks: Floats) -> pd.Series:
         for (sums, weight), order in product(counts.items(), orders):
             further[tuple(sorted(map(sum, zip(sums, order, strict=True))))] += weight / len(orders)
         counts = dict(further)
-    return pd.Series([*counts.values()], [sum((one - middle) ** 2 for one in sums) for sums in counts])
+    return pd.Series([*counts.values()], [sum((rank_sum - middle) ** 2 for rank_sum in sums) for sums in counts])
 
 
 def _slopes(answers: pd.DataFrame, design: Floats, direction: str | None) -> Numbers:
     """Fit each person's least-squares slopes; Student's t tests one slope, Hotelling's T² several."""
     complete, k = answers.dropna(), design.shape[1]
-    n, found = len(complete), {"n": len(complete), "dropped": len(answers) - len(complete)}
+    n, row = len(complete), {"n": len(complete), "dropped": len(answers) - len(complete)}
     fitted = np.linalg.lstsq(np.column_stack([np.ones(len(design)), design]), complete.T, rcond=None)[0]
     own = fitted[1:].T
     covariance = np.atleast_2d(np.cov(own.T))
     if n < max(10, k + 1) or np.linalg.matrix_rank(covariance, tol=1e-9) < k:
-        return found | dict.fromkeys(("statistic", "p"), math.nan)
+        return row | dict.fromkeys(("statistic", "p"), math.nan)
     intervals = [student(slopes) | {"level": 0.95} for slopes in own.T]
     if k == 1:
         tested = stats.ttest_1samp(own[:, 0], 0, alternative=direction or "two-sided")
-        found |= {"statistic": tested.statistic, "p": tested.pvalue, **named("interval", intervals[0])}
-        found["effect"] = own.mean()
+        row |= {"statistic": tested.statistic, "p": tested.pvalue, **named("interval", intervals[0])}
+        row["effect"] = own.mean()
     else:
         f = n * own.mean(0) @ np.linalg.inv(covariance) @ own.mean(0) * (n - k) / (k * (n - 1))
-        found |= {"statistic": f, "p": stats.f.sf(f, k, n - k)}
+        row |= {"statistic": f, "p": stats.f.sf(f, k, n - k)}
     for number, ends in enumerate(intervals):
-        found |= named(f"intervals.{number}", ends)
-    found["intercept_sd"] = fitted[0].std(ddof=1)
-    return found | named("slopes", enumerate(own.mean(0))) | named("sds", enumerate(own.std(0, ddof=1)))
+        row |= named(f"intervals.{number}", ends)
+    row["intercept_sd"] = fitted[0].std(ddof=1)
+    return row | named("slopes", enumerate(own.mean(0))) | named("sds", enumerate(own.std(0, ddof=1)))
 
 
 def _pairs(block: Block) -> None:
-    """Compare settings two by two in the statements that differ; one Holm family."""
-    differing = [one["item"] for one in block.found["omnibus"] if (one["p_adjusted"] or 0) <= 0.05]
+    """Compare pairs of settings in the statements that differ, as one Holm family."""
+    differing = [test["item"] for test in block.found["omnibus"] if (test["p_adjusted"] or 0) <= 0.05]
     pairs = [(item, *two) for item in differing for two in combinations(block.codes, 2) if block.found["pairs"]]
     outcomes = [signed_ranks(block.wide[item][first] - block.wide[item][second]) for item, first, second in pairs]
     names = dict(zip(block.codes, block.found["names"], strict=True))
@@ -236,25 +245,25 @@ def _pairs(block: Block) -> None:
 
 def _recognition(block: Block) -> None:
     """Recompute which name was rated highest, its hits among all exchanges of settings, and McNemar's tests."""
-    labels, truth = block.found["named"]["labels"], [one.get("label") for one in block.found["settings"]]
+    labels, truth = block.found["named"]["labels"], [setting.get("label") for setting in block.found["settings"]]
     ratings = np.stack([block.wide[label].to_numpy() for label in labels], axis=2)
     highest = ratings == ratings.max(axis=2, keepdims=True)
     decided = np.where(highest.sum(axis=2) == 1, np.array(labels)[highest.argmax(axis=2)], "undecided")
     names = np.where(np.isnan(ratings).any(axis=2), "unanswered", decided).tolist()
     used = [person for person in names if set(person) != {"unanswered"}]
-    given = [pair for person in used for pair in zip(truth, person, strict=True)]
-    hits, people = sum(right == name for right, name in given), []
+    label_pairs = [pair for person in used for pair in zip(truth, person, strict=True)]
+    hits, people = sum(right == name for right, name in label_pairs), []
     for person in used:
         answered = [pair for pair in zip(truth, person, strict=True) if pair[1] != "unanswered"]
         orders = permutations([name for _, name in answered])
         people.append([sum(map(str.__eq__, (str(right) for right, _ in answered), order)) for order in orders])
-    table = pd.crosstab(*zip(*[pair for pair in given if pair[1] in labels], strict=True))
+    table = pd.crosstab(*zip(*[pair for pair in label_pairs if pair[1] in labels], strict=True))
     columns = [*labels, "undecided", "unanswered"]
     own = {"n": len(used), "dropped": len(names) - len(used), "statistic": hits, "p": share_of_sums(people, hits)}
     own |= {"smallest_p": share_of_sums(people, sum(map(max, people))), "expected": sum(map(np.mean, people))}
     own |= {"effect": cohens_kappa(table.reindex(index=labels, columns=labels, fill_value=0), return_results=False)}
-    own |= {name: [name for _, name in given].count(name) for name in columns[-2:]}
-    own["decided"] = len(given) - own["undecided"] - own["unanswered"]
+    own |= {name: [name for _, name in label_pairs].count(name) for name in columns[-2:]}
+    own["decided"] = len(label_pairs) - own["undecided"] - own["unanswered"]
     for number, column in enumerate(zip(*used, strict=True)):
         own |= named(f"table.{number}", enumerate(map(column.count, columns)))
     rates = [_rate(used, setting, truth) for setting, label in enumerate(truth) if label is not None]
@@ -264,12 +273,14 @@ def _recognition(block: Block) -> None:
 
 
 def _rate(used: Sequence[Sequence[str]], setting: int, truth: Sequence[str | None]) -> Numbers:
-    """Return how often a setting was named rightly, and McNemar's exact p against the setting that rivals it most."""
+    """Return the rate of correct names of a setting, and McNemar's exact p against its strongest rival."""
     label, ps = truth[setting], {}
     answered = [person for person in used if person[setting] != "unanswered"]
     hits, n = sum(person[setting] == label for person in answered), len(answered)
     for other in (other for other, name in enumerate(truth) if name != label):
-        both = [(one[setting] == label, one[other] == label) for one in answered if one[other] != "unanswered"]
+        both = [
+            (labels[setting] == label, labels[other] == label) for labels in answered if labels[other] != "unanswered"
+        ]
         more, less = both.count((True, False)), both.count((False, True))
         ps[other] = stats.binomtest(more, more + less, alternative="greater").pvalue if more + less else 1.0
     rival = max(ps, key=lambda other: ps[other])
@@ -278,11 +289,11 @@ def _rate(used: Sequence[Sequence[str]], setting: int, truth: Sequence[str | Non
 
 
 def _trends(block: Block) -> None:
-    """Test the trend of each statement; where it is shown, again without the longest delay, as long as it is."""
+    """Test the trend of each statement; while it is significant, repeat the test without the longest delay."""
     outcomes = {item: _trend(answers, block.sides.get(item)) for item, answers in block.wide.items()}
     block.record_family("trends", "answers follow the delay", outcomes)
-    for number, item in enumerate(one["item"] for one in block.found["lowest"]):
-        answers, place, shown = block.wide[item], f"lowest.{number}.steps", math.nan
+    for number, item in enumerate(lowest["item"] for lowest in block.found["lowest"]):
+        answers, place, longest_ms = block.wide[item], f"lowest.{number}.steps", math.nan
         for step, last in enumerate(range(len(block.codes), 1, -1)):
             own = _trend(answers.where(answers.notna().all(axis=1)).iloc[:, :last], block.sides.get(item))
             longest = {"longest_ms": block.delays[last - 1]}
@@ -291,8 +302,8 @@ def _trends(block: Block) -> None:
             block.record(f"{place}.steps.{step}.trend", own, *words)
             if own["p"] > 0.05:
                 break
-            shown = longest["longest_ms"]
-        own = {"steps.lowest_ms": shown, "steps.alpha": 0.05, "members": len(block.primary)}
+            longest_ms = longest["longest_ms"]
+        own = {"steps.lowest_ms": longest_ms, "steps.alpha": 0.05, "members": len(block.primary)}
         block.compared.check(f"{block.place}.lowest.{number}", own)
 
 
@@ -315,7 +326,7 @@ def _trend(answers: pd.DataFrame, direction: str | None) -> Numbers:
 
 
 def _equivalence(block: Block) -> None:
-    """Two one-sided t tests, and the share of participants who differ by more than the bound."""
+    """Run two one-sided t tests and count the participants who differ by more than the bound."""
     bound, alpha = (block.compared.results["decided"][name] for name in ("equivalence_bound", "alpha"))
     for number, (item, place) in enumerate(product(block.wide, range(1, len(block.codes))) if bound else ()):
         answers, delay, control = block.wide[item], block.delays[place], block.delays[0]

@@ -37,7 +37,7 @@ ROOT = Path(__file__).resolve().parents[3]
 NOT_MEASURED = frozenset({"part", "intervals", "targets", "setting", "standard", "level", "catch", "response", "value"})
 MEASURED = {
     name: column.kind
-    for name, column in {it.name: it for it in (*RESPONSES, *INTERVALS, *TRIALS)}.items()
+    for name, column in {variable.name: variable for variable in (*RESPONSES, *INTERVALS, *TRIALS)}.items()
     if column.may_miss and column.kind in ("integer", "number", "flag") and name not in NOT_MEASURED
 }
 SPREAD = 0.05
@@ -58,7 +58,7 @@ class Written:
         return lists if lists.exists() else self.study
 
     def compared(self) -> Compared:
-        """Return the report with what the oracle recomputed of it."""
+        """Return the report with the numbers that the oracle recomputed."""
         compared, study = Compared(self.report), tomllib.loads((ROOT / self.file).read_text("utf-8"))
         names = ["responses", "trials", *(["intervals"] if [*self.report.glob("*intervals_data.csv")] else [])]
         answers, trials, *intervals = (read_table(self.report, name, self.lists) for name in names)
@@ -73,7 +73,7 @@ class Written:
 
 
 def write(name: str, study: Path, to: Path, *, figures: bool = False) -> Written:
-    """Write the report of a study, its figures as texts alone or not at all."""
+    """Write the report of a study; its figures contain only texts, or are omitted."""
     with figures_as_lines(), pytest.MonkeyPatch.context() as patched:
         if not figures:
             for what in ("block", "summary", "level", "question"):
@@ -86,7 +86,7 @@ def write(name: str, study: Path, to: Path, *, figures: bool = False) -> Written
 
 
 def statements(folder: Path, name_of: Callable[[int], str] = "P{:03d}".format, key_seed: int = 3) -> Path:
-    """Return the thesis' study of people who notice delays; answers depend on person, condition and statement alone."""
+    """Return the thesis' study; answers depend only on person, condition and statement."""
     results = make_results(folder / "study", load("rek2024"), key_seed=key_seed)
     for number in range(1, 13):
 
@@ -116,7 +116,7 @@ def levels(folder: Path) -> Path:
 
 
 def groups(folder: Path) -> Path:
-    """Return a study of statements of two groups, with forms; a session and a trial are excluded, and one is left."""
+    """Return a study of two groups with forms; a session and a trial are excluded, and one session is unfinished."""
     file = FILES["groups"]
     study = rehearse_answers(file, participants=14, seed=4, results=folder / "study", features=made_up(str(file)))
     exclude(study, "P003", 1, by="AB", reason="asleep")
@@ -128,19 +128,19 @@ def groups(folder: Path) -> Path:
 
 
 def sites(folder: Path) -> Path:
-    """Return a study of two sites with two keys, each with an exclusion, and one with an erased participant."""
-    file, listed = FILES["sites"], []
+    """Return a study of two sites with a key and an exclusion each; one site has a withdrawn participant."""
+    file, site_entries = FILES["sites"], []
     for site, people, seed in (("north", 8, 4), ("south", 7, 9)):
         own = rehearse_answers(file, participants=people, seed=seed, results=folder / site, features=made_up(str(file)))
         trial = None if site == "north" else 2
         exclude(own, "P003", 1, trial=trial, by="AB", reason="asleep")
-        listed.append({"participant": f"{site}-P003", "session": "1", "trial": str(trial or "n/a")})
+        site_entries.append({"participant": f"{site}-P003", "session": "1", "trial": str(trial or "n/a")})
         if site == "south":
             erase(own, "P005", by="CD", reason="asked for it")
         unblind(own, "AB", "to analyse")
         draw_measurements(own, seed)
     (folder / "lists").mkdir()
-    write_rows(folder / "lists" / "exclusions.csv", listed)
+    write_rows(folder / "lists" / "exclusions.csv", site_entries)
     merge_sites({"north": folder / "north", "south": folder / "south"}, folder / "study")
     return folder / "study"
 
@@ -151,8 +151,8 @@ def withdraw(session: SessionFolder, trials: int = 3) -> None:
     session.receipt.write_text(json.dumps(known | {"status": "withdrawn"}), "utf-8")
     for path in session.path.glob("*_data.csv"):
         head, *rows = list(csv.reader(path.read_text("utf-8").splitlines()))
-        kept = [row for row in rows if row[head.index("trial")] in ("n/a", *map(str, range(1, trials + 1)))]
-        write_rows(path, [dict(zip(head, row, strict=True)) for row in kept])
+        kept_rows = [row for row in rows if row[head.index("trial")] in ("n/a", *map(str, range(1, trials + 1)))]
+        write_rows(path, [dict(zip(head, row, strict=True)) for row in kept_rows])
 
 
 def draw_measurements(study: Path, seed: int = 1) -> None:

@@ -41,8 +41,8 @@ PARTICIPANTS, STUDIES, OWN_STUDIES = 12, 500, 4000
 TABLE = "[simulated_participants]\nnoise_sd = {}\nbias_sd = {}\nslope_sd = {}\nlapse_rate = {}\n"
 
 
-def planned(text: str = TEXT) -> Plan:
-    """Return a plan with one statement; one of two statements would be corrected for the other."""
+def one_statement_plan(text: str = TEXT) -> Plan:
+    """Return a plan with one statement, so that its test is not corrected for another one."""
     huge = replace(NO_FEATURES, force_mean_n=100.0, speed_rms_mps=0.1)
     features = {("feel", "heavyzembla"): (huge,), ("feel", "lightquorn"): (NO_FEATURES,)}
     study = plan(parse(text.encode(), "small.toml"), features)
@@ -50,7 +50,7 @@ def planned(text: str = TEXT) -> Plan:
     return replace(study, blocks=(replace(block, items=block.items[:1]),))
 
 
-def counted(study: Plan, studies: int, seed: int) -> dict[str, Counts]:
+def power_counts(study: Plan, studies: int, seed: int) -> dict[str, Counts]:
     counts: dict[str, Counts] = {}
     for batch in range(studies // BATCH):
         counts = total_counts(counts, count_findings(study, (PARTICIPANTS,), seed, batch, BATCH))
@@ -78,9 +78,9 @@ def signed_rank_p(differences: np.ndarray) -> np.ndarray:
     signs = np.array(list(product((0.0, 1.0), repeat=differences.shape[1])), np.float32)
     ranks = np.where(differences == 0, np.nan, np.abs(differences))
     ranks = np.nan_to_num(rankdata(ranks, axis=1, nan_policy="omit"))
-    seen, whole = (ranks * (differences > 0)).sum(axis=1), ranks.sum(axis=1)
+    rank_sum, whole = (ranks * (differences > 0)).sum(axis=1), ranks.sum(axis=1)
     away = np.abs(signs @ ranks.T.astype(np.float32) - whole / 2)
-    return np.asarray((away >= np.abs(seen - whole / 2) - 1e-4).mean(axis=0))
+    return np.asarray((away >= np.abs(rank_sum - whole / 2) - 1e-4).mean(axis=0))
 
 
 def test_the_independent_signed_rank_test_is_scipys() -> None:
@@ -92,8 +92,8 @@ def test_the_independent_signed_rank_test_is_scipys() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("effect", [0.25, 0.375, 0.5])
 def test_an_independent_simulation_finds_the_same_power(effect: float) -> None:
-    study = replace(planned(), kinds={**PUBLISHED, "lapsing": SimulatedParticipants(lapse_rate=0.2)})
-    counts = counted(study, STUDIES, 7)
+    study = replace(one_statement_plan(), kinds={**PUBLISHED, "lapsing": SimulatedParticipants(lapse_rate=0.2)})
+    counts = power_counts(study, STUDIES, 7)
     for name, kind in study.kinds.items():
         program = counts[name]["feel", "found"][0, EFFECTS.index(effect), 0] / STUDIES
         own = own_share(kind, effect)
@@ -103,15 +103,15 @@ def test_an_independent_simulation_finds_the_same_power(effect: float) -> None:
 
 def test_the_people_of_the_study_file_come_first_and_the_range_encloses_them() -> None:
     text = TEXT + TABLE.format(0.63, 0.5, 0.5, 0)
-    study = planned(text)
-    found = powers(study, (PARTICIPANTS,), 40, 40, 7, counted(study, 40, 7))
-    assert list(found.kinds) == [STATED, CONSISTENT, NOISY]
-    first, consistent, noisy = found.kinds.values()
+    study = one_statement_plan(text)
+    power_results = powers(study, (PARTICIPANTS,), 40, 40, 7, power_counts(study, 40, 7))
+    assert list(power_results.kinds) == [STATED, CONSISTENT, NOISY]
+    first, consistent, noisy = power_results.kinds.values()
     assert first == consistent  # equal values, equal people
-    assert [one.power for one in noisy] != [one.power for one in first]
-    told = power_markdown(found)
-    assert "% of studies detect the effect if participants are consistent, " in told
-    assert power_csv(found).count(b",noisy,") == len(noisy)
+    assert [curve.power for curve in noisy] != [curve.power for curve in first]
+    page_text = power_markdown(power_results)
+    assert "% of studies detect the effect if participants are consistent, " in page_text
+    assert power_csv(power_results).count(b",noisy,") == len(noisy)
 
 
 @given(
@@ -127,7 +127,7 @@ def test_power_falls_with_noise_and_with_the_spread_of_slopes(key: str, seed: in
         str(value): SimulatedParticipants(**{"noise_sd": 0.4, "slope_sd": 0.4, "bias_sd": bias} | {key: value})
         for value in (0.4, 1.4)
     }
-    counts = counted(replace(planned(), kinds=kinds), 100, seed)
+    counts = power_counts(replace(one_statement_plan(), kinds=kinds), 100, seed)
     low, high = (counts[kind]["feel", "found"][0, EFFECTS.index(effect), 0] for kind in kinds)
     assert low > high
 
@@ -147,7 +147,7 @@ def test_values_beyond_their_range_are_refused(values: tuple[float, ...], said: 
 
 
 def test_typical_people_are_the_default_of_the_table() -> None:
-    (kind, *_) = planned(TEXT + "[simulated_participants]\nnoise_sd = 1.10\n").kinds.values()
+    (kind, *_) = one_statement_plan(TEXT + "[simulated_participants]\nnoise_sd = 1.10\n").kinds.values()
     assert kind == PUBLISHED[TYPICAL]
 
 
@@ -160,8 +160,8 @@ def test_the_command_adds_the_planned_number_of_participants_and_quotes_it(
     monkeypatch.setattr("study_app.session.simulated.rehearsal.condition_features", lambda *_, **_named: features)
     file = tmp_path / "small.toml"
     file.write_text(f"{TEXT}\n[analysis]\nparticipants = 7\n", encoding="utf-8", newline="\n")
-    asked = ["power", str(file), "--studies", "20", "--workers", "1", "--to", str(tmp_path)]
-    result = CliRunner().invoke(commands, asked)
+    command = ["power", str(file), "--studies", "20", "--workers", "1", "--to", str(tmp_path)]
+    result = CliRunner().invoke(commands, command)
     assert result.exit_code == 0, result.output
     assert "| statement | n = 5 | n = 7 (planned) | n = 8 | n = 12 |" in result.output
     registered = CliRunner().invoke(commands, ["preregister", str(file), "--power", str(tmp_path)]).output

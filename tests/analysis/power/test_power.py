@@ -35,7 +35,7 @@ SIZES = (5, 9)
 
 
 def felt_in(protocol: Any) -> dict[tuple[str, str], tuple[TrialFeatures, ...]]:
-    """Liquids that differ in force, delays that differ in what was seen."""
+    """Return features in which liquids differ in force and delays in the seen lag."""
     return {
         (block.id, condition): (
             TrialFeatures(
@@ -68,8 +68,8 @@ def planned(name: str = "rek2024") -> Plan:
 def swept(
     study: Plan, studies: int = 30, *, sizes: tuple[int, ...] = SIZES, seed: int = 1, executor: Executor | None = None
 ) -> tuple[int, dict[str, Counts]]:
-    with ThreadPoolExecutor(1) as one:
-        *_, last = sweep(study, sizes, studies, seed, executor or one)
+    with ThreadPoolExecutor(1) as one_thread:
+        *_, last = sweep(study, sizes, studies, seed, executor or one_thread)
     return last
 
 
@@ -85,30 +85,30 @@ def test_the_command_writes_the_same_bytes_with_one_worker_two_and_a_cluster(
     monkeypatch.setattr(
         "study_app.session.simulated.rehearsal.condition_features", lambda protocol, **_: felt_in(protocol)
     )
-    written = []
+    outputs = []
     for number, words in enumerate(worker_options):
         to = tmp_path / str(number)
-        asked = ("power", "rek2024", "--sizes", "5", "--studies", "50", "--to", str(to))
-        result = CliRunner().invoke(commands, [*asked, *words])
+        command = ("power", "rek2024", "--sizes", "5", "--studies", "50", "--to", str(to))
+        result = CliRunner().invoke(commands, [*command, *words])
         assert result.exit_code == 0, result.output
-        written.append({path.name: path.read_bytes() for path in to.iterdir()})
-    assert written[0].keys() >= {"power.csv", "power.md", "power-delays.png"}
-    assert all(files == written[0] for files in written)
+        outputs.append({path.name: path.read_bytes() for path in to.iterdir()})
+    assert outputs[0].keys() >= {"power.csv", "power.md", "power-delays.png"}
+    assert all(files == outputs[0] for files in outputs)
 
 
 def test_engine_dask_and_its_variable_are_other_words_for_a_cluster(monkeypatch: pytest.MonkeyPatch) -> None:
     cluster = "tcp://lab1:8786"
-    opened: list[Workers] = []
+    opened_workers: list[Workers] = []
 
     def opening(workers: Workers) -> Any:
-        opened.append(workers)
+        opened_workers.append(workers)
         raise AnalysisError("opened")
 
     monkeypatch.setattr("study_app.cli.power.executor_for", opening)
     monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", cluster)
     for words in (("--engine", "dask"), (), ("--jobs", "3"), ("--engine", "processes")):
         assert isinstance(CliRunner().invoke(commands, ["power", "rek2024", *words]).exception, AnalysisError)
-    assert opened == [Workers(cluster=cluster), Workers(cluster=cluster), Workers(3), Workers()]
+    assert opened_workers == [Workers(cluster=cluster), Workers(cluster=cluster), Workers(3), Workers()]
 
 
 @pytest.mark.parametrize(
@@ -168,9 +168,9 @@ def test_the_lowest_delay_is_the_step_downs_of_the_report() -> None:
     lowest = []
     for study in range(BATCH):
         answers = draw_opinions(study_plan, 9, 1, study)[1].answers(1.0, PUBLISHED[CONSISTENT])
-        found = step_down(answers[:, :, place], delays.delays_ms).lowest_ms
-        lowest.append(np.inf if found is None else found)
-    expected = [sum(one <= delay for one in lowest) for delay in delays.delays_ms]
+        lowest_ms = step_down(answers[:, :, place], delays.delays_ms).lowest_ms
+        lowest.append(np.inf if lowest_ms is None else lowest_ms)
+    expected = [sum(lowest_delay <= delay for lowest_delay in lowest) for delay in delays.delays_ms]
     assert np.abs(counts["delays", "lowest"][0, place, 1:] - expected[1:]).max() <= 2  # p at the edge is drawn
 
 
@@ -182,16 +182,16 @@ def test_the_interval_is_wilsons() -> None:
 
 
 def test_a_block_of_some_groups_counts_their_participants() -> None:
-    """Where all groups have a block, nothing is said."""
+    """The participants of a block are stated only if some groups lack it."""
     steps = {"a": ["hello", "thin", "end"], "b": ["hello", "thin", "thick", "end"]}
     groups = "".join(f"\n[groups.{name}]\nsequence = {of_group}\n" for name, of_group in steps.items())
-    felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
-    study_plan = plan(grouped(groups=groups), felt)
+    features = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
+    study_plan = plan(grouped(groups=groups), features)
     assert {block.id: block.groups for block in study_plan.blocks} == {"thin": (), "thick": ("b",)}
     studies, counts = swept(study_plan)
-    found = powers(study_plan, SIZES, studies, studies, 1, counts)
+    power_results = powers(study_plan, SIZES, studies, studies, 1, counts)
     words = "n counts only the participants in b, because other groups do not complete this block."
-    assert power_markdown(found).count(words) == 1
+    assert power_markdown(power_results).count(words) == 1
 
 
 def test_a_planned_block_has_the_conditions_statements_and_features_of_the_study() -> None:
@@ -204,15 +204,17 @@ def test_a_planned_block_has_the_conditions_statements_and_features_of_the_study
             names.sort(key=lambda condition: conditions[condition].delay_ms)
         assert [setting.condition for setting in block.settings] == names
         assert block.codes == tuple(f"S{place}" for place in range(1, len(names) + 1))
-        assert [setting.liquid for setting in block.settings] == [conditions[it].liquid for it in names]
-        assert [setting.delay_ms for setting in block.settings] == [conditions[it].delay_ms for it in names]
-        assert [setting.label for setting in block.settings] == [conditions[it].label for it in names]
-        assert block.features == tuple(felt_in(protocol)[name, it] for it in names)
+        assert [setting.liquid for setting in block.settings] == [conditions[condition].liquid for condition in names]
+        assert [setting.delay_ms for setting in block.settings] == [
+            conditions[condition].delay_ms for condition in names
+        ]
+        assert [setting.label for setting in block.settings] == [conditions[condition].label for condition in names]
+        assert block.features == tuple(felt_in(protocol)[name, condition] for condition in names)
         assert (block.title, block.repetitions, block.groups) == (stated.title["en"], stated.repetitions, ())
-        asked = protocol.questionnaire_of(name)
-        assert asked is not None
+        questionnaire = protocol.questionnaire_of(name)
+        assert questionnaire is not None
         assert [(item.id, item.text, item.short) for item in block.items] == [
-            (question.id, question.text["en"], question.short["en"]) for question in asked.statements
+            (question.id, question.text["en"], question.short["en"]) for question in questionnaire.statements
         ]
         assert block.labels == tuple("1234567")
     assert {block.kind for block in blocks.values()} == {"delays", "liquids"}
@@ -227,6 +229,22 @@ stimuli.damping = { vary = "damping_nspm", level = "value", standards = [5, 11],
 methods.set = { kind = "adjustment", repetitions = 6 }
 blocks.weak = { stimulus = "damping", design = "adjustment", method = "set" }
 """
+
+
+def test_a_hypothesis_about_settings_has_its_smallest_difference(tmp_path: Path) -> None:
+    path, to = tmp_path / "matching.toml", tmp_path / "to"
+    strong = 'blocks.strong = { stimulus = "damping", design = "adjustment", method = "set" }\n'
+    path.write_text(ADJUSTMENT + strong, encoding="utf-8", newline="\n")
+    refused = CliRunner().invoke(commands, ["power", str(path), "--to", str(to)])
+    assert "are not simulated" in str(refused.exception)
+    assert not to.exists()
+    contrast = '[[analysis.contrasts]]\nmeasure = "pse"\nblocks = ["weak", "strong"]\n'
+    path.write_text(ADJUSTMENT + strong + contrast, encoding="utf-8", newline="\n")
+    result = CliRunner().invoke(commands, ["power", str(path), "--sizes", "8", "--to", str(to)])
+    assert result.exit_code == 0, result.output
+    assert "Settings are not simulated. Differences are expressed in standard deviations (SD)" in result.output
+    assert "| point of subjective equality | 8 | 1 | ±0.84 SD | ±1.36 SD |" in result.output
+    assert (to / "power.md").read_text("utf-8") in result.output
 
 
 def changed_blocks(**changes: Any) -> Protocol:

@@ -34,12 +34,12 @@ def test_power_of_small_plans(
     counts = count_findings(planned, (3, 7), 1, 0, 3)
     lines = list[str]()
     rng = np.random.default_rng(5)
-    drawn = {
-        kind: {what: one if what[1] == "means" else rng.integers(0, 4, one.shape) for what, one in of.items()}
+    random_counts = {
+        kind: {what: values if what[1] == "means" else rng.integers(0, 4, values.shape) for what, values in of.items()}
         for kind, of in counts.items()
     }
-    for given, asked in ((counts, 3), (drawn, 40)):
-        for path in sorted(write_power(powers(planned, (3, 7), 3, asked, 1, given), tmp_path)):
+    for study_counts, planned_studies in ((counts, 3), (random_counts, 40)):
+        for path in sorted(write_power(powers(planned, (3, 7), 3, planned_studies, 1, study_counts), tmp_path)):
             if path.suffix not in (".svg", ".pdf"):
                 content = path.read_bytes()
                 if path.suffix == ".csv":
@@ -62,12 +62,12 @@ def check_powers(table: pd.DataFrame, studies: int) -> None:
 @pytest.mark.parametrize("name", ["updown", pytest.param("questplus", marks=pytest.mark.slow)])
 def test_precision_of_small_plans(name: str, pytestconfig: pytest.Config) -> None:
     method = {"updown": 'kind = "updown", trials = 20', "questplus": 'kind = "questplus", trials = 20'}[name]
-    found = swept(study(('kind = "questplus", trials = 20', method)), (10, 20), (1, 3), 4)
-    table = pd.read_csv(io.BytesIO(threshold_csv(found)))
+    precisions = swept(study(('kind = "questplus", trials = 20', method)), (10, 20), (1, 3), 4)
+    table = pd.read_csv(io.BytesIO(threshold_csv(precisions)))
     assert [tuple(row) for row in table[["trials", "participants"]].to_numpy()] == [(10, 1), (10, 3), (20, 1), (20, 3)]
     assert (table["half_interval"].isna() == (table["participants"] == 1)).all(), "one participant has no interval"
     for row in table[table["within"].notna()].itertuples():
         ends = binomtest(round(row.within * row.studies), row.studies).proportion_ci(method="wilson")
         assert (row.within_low, row.within_high) == pytest.approx(tuple(ends), abs=6e-4)
     if name == "updown":
-        compare(GOLDEN / "precision.txt", each_once(threshold_markdown(found).splitlines()), pytestconfig)
+        compare(GOLDEN / "precision.txt", each_once(threshold_markdown(precisions).splitlines()), pytestconfig)

@@ -48,7 +48,7 @@ PLAN = Plan(
 
 
 def by_effect(*rows: tuple[int, int]) -> np.ndarray:
-    """Return the counts of each size, rising from none to the full effect; all studies find larger effects."""
+    """Return the counts of each size, which rise up to the full effect; larger effects are always detected."""
     counts = np.zeros((len(rows), len(EFFECTS)))
     for row, (without, full) in enumerate(rows):
         counts[row] = np.interp(np.arange(len(EFFECTS)), [0, FULL, FULL + 1], [without, full, STUDIES])
@@ -144,7 +144,7 @@ def test_the_tables_name_each_block_test_and_range_over_the_kinds_of_participant
     assert "(seed 7, liquid-study" in text
     assert "Tests use α = 0.04; p values" in text
     assert "**Preliminary: 20 of 40 studies were simulated.**" in lines
-    assert "The model does not assume any effects for warm, so any effects detected for these" in text
+    assert "The model does not assume any effects for warm, so any effects detected for this statement are" in text
     groups = (
         "Title oils: n counts only the participants in old and new, because other groups do not complete this block."
     )
@@ -180,7 +180,7 @@ def test_the_tables_name_each_block_test_and_range_over_the_kinds_of_participant
         f"- {title}: {consistent} of studies {finding} if participants are consistent, {typical} if they are typical, "
         f"and {noisy} if they are noisy."
         for title, finding, (consistent, typical, noisy) in (
-            ("Different (trend over delay)", "detect the effect", ("35 %", "20 %", "0 %")),
+            ("Different (trend over delay in Title late)", "detect the effect", ("35 %", "20 %", "0 %")),
             (FIRST, "detect the effect", ("75 %",) * 3),
             (f"{FIRST}, if there is no difference", "show equivalence", ("25 %",) * 3),
             (SECOND, "detect the effect", ("80 %",) * 3),

@@ -116,16 +116,16 @@ def test_a_contrast_has_the_errors_of_both_blocks_and_the_alpha_of_its_family() 
     assert "(one-sided, α = 0.025 (0.05 divided by 2 hypotheses))" in first
     assert "participants, at α = 0.05." in first
     assert "(two-sided, α = 0.025 (0.05 divided by 2 hypotheses))" in second
-    assert "## Contrast: threshold is higher in Late than in Prompt, with an equivalence bound of 1.25" in lines
+    assert "## Contrast: the threshold is higher in Late than in Prompt, with an equivalence bound of 1.25" in lines
     assert not [line for line in lines if line.startswith("| 40 | 12 (planned) | ×/÷")]
 
 
 def test_a_preregistration_states_each_hypothesis_with_its_test_and_bound() -> None:
     first, second, inclusion, *questions = documents.hypotheses(two(), "en")
     assert first.startswith(
-        "Hypothesis: threshold is higher in “Late” (late_one) than in “Prompt” (prompt_one), with an equivalence bound "
-        "of 1.25. We test it with a one-sided paired t test on log-transformed values, using one value per participant."
-        " Participants are weighted as in the group mean."
+        "Hypothesis: the threshold is higher in “Late” (late_one) than in “Prompt” (prompt_one), with an equivalence "
+        "bound of 1.25. We test it with a one-sided paired t test on log-transformed values, using one value per "
+        "participant. Participants are weighted as in the group mean."
     )
     assert " We test equivalence with two one-sided t tests and a bootstrap. This requires at least " in first
     assert "with a two-sided paired t test" in second

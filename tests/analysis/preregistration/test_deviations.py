@@ -33,61 +33,61 @@ def receipts(results: Results, **changes: object) -> None:
 
 
 @pytest.fixture
-def answered(small: Results) -> Results:
+def answered_study(small: Results) -> Results:
     for person in ("P001", "P002", "P003"):
         small.add(person, lambda condition, item: 5)
     receipts(small, protocol_hash=HASH)
     return small
 
 
-def committed(results: Results, participants: int | None = 3, **changes: object) -> Path:
-    one = Commitment(
+def save_preregistration(results: Results, participants: int | None = 3, **changes: object) -> Path:
+    commitment = Commitment(
         study="small", version="2", protocol_hash=HASH, participants=participants, precision=None, rules=(CATCH,)
     )
     path = results.folder / FILE
-    path.write_text(f"# Preregistration\n\n{commitment_lines(one)}", encoding="utf-8", newline="\n")
+    path.write_text(f"# Preregistration\n\n{commitment_lines(commitment)}", encoding="utf-8", newline="\n")
     return path
 
 
 def evaluate_block(results: Results) -> tuple[str, ...]:
-    found = deviations(load_study(results.folder))
-    assert found is not None
-    return found.found
+    study_deviations = deviations(load_study(results.folder))
+    assert study_deviations is not None
+    return study_deviations.found
 
 
-def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
-    committed(answered)
-    assert evaluate_block(answered) == ()
-    text = " ".join(map(str, deviations_section(load_study(answered.folder))))
+def test_a_study_that_follows_its_preregistration_has_no_deviations(answered_study: Results) -> None:
+    save_preregistration(answered_study)
+    assert evaluate_block(answered_study) == ()
+    text = " ".join(map(str, deviations_section(load_study(answered_study.folder))))
     assert "match the preregistration" in text
     assert HASH in text
 
 
 @pytest.mark.slow
-def test_fewer_participants_and_another_number_than_the_protocols_are_deviations(answered: Results) -> None:
-    committed(answered, 12)
-    assert evaluate_block(answered) == ("there are fewer participants than planned (3 instead of 12)",)
-    committed(answered, 2)
-    assert evaluate_block(answered) == ("there are more participants than planned (3 instead of 2)",)
-    committed(answered, None)
-    assert evaluate_block(answered) == ()
+def test_fewer_participants_and_another_number_than_the_protocols_are_deviations(answered_study: Results) -> None:
+    save_preregistration(answered_study, 12)
+    assert evaluate_block(answered_study) == ("there are fewer participants than planned (3 instead of 12)",)
+    save_preregistration(answered_study, 2)
+    assert evaluate_block(answered_study) == ("there are more participants than planned (3 instead of 2)",)
+    save_preregistration(answered_study, None)
+    assert evaluate_block(answered_study) == ()
 
 
-def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
-    committed(answered)
-    (first, *_) = StudyFolder(answered.folder).sessions()
+def test_sessions_under_another_protocol_are_named(answered_study: Results) -> None:
+    save_preregistration(answered_study)
+    (first, *_) = StudyFolder(answered_study.folder).sessions()
     content = json.loads(first.receipt.read_text(encoding="utf-8"))
     first.receipt.write_text(json.dumps(content | {"protocol_hash": "cd" * 32}), encoding="utf-8", newline="\n")
-    (line,) = evaluate_block(answered)
+    (line,) = evaluate_block(answered_study)
     assert line.startswith("1 session used a protocol (version 2) that differs from the preregistered protocol")
     assert line.endswith("P001/1")
 
 
 @pytest.mark.slow
-def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answered: Results) -> None:
-    committed(answered)
-    answered.exclude("P001", trial=2, reason="sneezed")
-    (line,) = evaluate_block(answered)
+def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answered_study: Results) -> None:
+    save_preregistration(answered_study)
+    answered_study.exclude("P001", trial=2, reason="sneezed")
+    (line,) = evaluate_block(answered_study)
     assert line.startswith("there is an exclusion without a preregistered rule (")
     assert line.endswith("; sneezed; AB)")
     by_rule = Exclusion(
@@ -98,33 +98,33 @@ def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answe
         reason="4 of 8 wrong",
         excluded_at="2026-01-06T10:00:00.000+01:00",
     )
-    listed = (*exclusions(answered.folder), by_rule)
-    StudyFolder(answered.folder).exclusions.write_bytes(exclusion_bytes(listed))
-    lines = evaluate_block(answered)
+    all_exclusions = (*exclusions(answered_study.folder), by_rule)
+    StudyFolder(answered_study.folder).exclusions.write_bytes(exclusion_bytes(all_exclusions))
+    lines = evaluate_block(answered_study)
     assert lines[0] == "there are fewer participants than planned (2 instead of 3)"
     assert len(lines) == 2
     assert "sneezed" in lines[1]
 
 
-def test_where_only_the_protocol_plans_participants_they_are_compared(answered: Results) -> None:
-    (first, *_) = StudyFolder(answered.folder).sessions()
+def test_where_only_the_protocol_plans_participants_they_are_compared(answered_study: Results) -> None:
+    (first, *_) = StudyFolder(answered_study.folder).sessions()
     protocol = json.loads(first.receipt.read_text(encoding="utf-8"))["protocol"]
     analysis = {
         "alpha": 0.05, "equivalence_bound": None, "primary": [], "names": [], "rising": [], "falling": [],
         "noticed": None, "participants": 20,
     }  # fmt: skip
-    receipts(answered, protocol=protocol | {"analysis": analysis})
-    assert deviations(load_study(answered.folder)) == Deviations(
+    receipts(answered_study, protocol=protocol | {"analysis": analysis})
+    assert deviations(load_study(answered_study.folder)) == Deviations(
         None, ("there are fewer participants than planned (3 instead of 20)",)
     )
 
 
 def test_the_preregistration_of_a_rehearsal_is_in_the_folder_of_its_study(
-    answered: Results, monkeypatch: pytest.MonkeyPatch
+    answered_study: Results, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rehearsal = answered.folder.rename(answered.folder.with_name("small-rehearsal-1"))
-    (study := answered.folder.with_name("small")).mkdir()
-    committed(replace(answered, folder=study), participants=7)
+    rehearsal = answered_study.folder.rename(answered_study.folder.with_name("small-rehearsal-1"))
+    (study := answered_study.folder.with_name("small")).mkdir()
+    save_preregistration(replace(answered_study, folder=study), participants=7)
     compared = deviations(load_study(rehearsal))
     assert compared is not None
     assert compared.commitment is not None
@@ -135,40 +135,40 @@ def test_the_preregistration_of_a_rehearsal_is_in_the_folder_of_its_study(
     assert json.loads(files["report.json"])["preregistration"]["found"] == list(compared.found)
 
 
-def test_the_report_of_people_says_where_a_preregistration_is_missing(answered: Results) -> None:
-    (first, *_) = StudyFolder(answered.folder).sessions()
+def test_the_report_of_people_says_where_a_preregistration_is_missing(answered_study: Results) -> None:
+    (first, *_) = StudyFolder(answered_study.folder).sessions()
     protocol = json.loads(first.receipt.read_text(encoding="utf-8"))["protocol"]
     analysis = {"alpha": 0.05, "equivalence_bound": None, "primary": [], "names": [], "rising": [], "falling": []}
-    receipts(answered, protocol=protocol | {"analysis": analysis | {"noticed": None, "participants": 3}})
-    told = load_study(answered.folder)
+    receipts(answered_study, protocol=protocol | {"analysis": analysis | {"noticed": None, "participants": 3}})
+    study_of_answers = load_study(answered_study.folder)
     for simulated in (True, False):
-        study = replace(told, participants=told.participants.assign(simulated=simulated))
+        study = replace(study_of_answers, participants=study_of_answers.participants.assign(simulated=simulated))
         text = " ".join(map(str, deviations_section(study)))
         assert ("does not contain preregistration.md" in text) != simulated
         assert "Only the number of participants is compared" in text
 
 
 @pytest.mark.parametrize("content", ["# nothing\n", "```json\n{}\n```\n", "```json\n{broken}\n```\n"])
-def test_a_damaged_preregistration_is_one_line(answered: Results, content: str) -> None:
-    (answered.folder / FILE).write_text(content, encoding="utf-8", newline="\n")
+def test_a_damaged_preregistration_is_one_line(answered_study: Results, content: str) -> None:
+    (answered_study.folder / FILE).write_text(content, encoding="utf-8", newline="\n")
     with pytest.raises(AnalysisError, match="does not end with the block that `liquid-study preregister` writes"):
-        deviations(load_study(answered.folder))
+        deviations(load_study(answered_study.folder))
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("figures_of_the_page")
-def test_the_report_lists_deviations_and_hashes_the_file(answered: Results, tmp_path: Path) -> None:
-    committed(answered, 12)
+@pytest.mark.usefixtures("png_figures_only")
+def test_the_report_lists_deviations_and_hashes_the_file(answered_study: Results, tmp_path: Path) -> None:
+    save_preregistration(answered_study, 12)
     written_to = tmp_path / "report"
-    report(answered.folder, written_to)
+    report(answered_study.folder, written_to)
     page = (written_to / "report.html").read_text(encoding="utf-8")
     assert "there are fewer participants than planned (3 instead of 12)" in page
     content = json.loads((written_to / "report.json").read_text(encoding="utf-8"))
     assert content["preregistration"]["found"] == ["there are fewer participants than planned (3 instead of 12)"]
     assert content["preregistration"]["commitment"]["protocol_hash"] == HASH
     assert FILE in content["files"]
-    (answered.folder / FILE).unlink()
-    report(answered.folder, written_to)
+    (answered_study.folder / FILE).unlink()
+    report(answered_study.folder, written_to)
     content = json.loads((written_to / "report.json").read_text(encoding="utf-8"))
     assert "preregistration" not in content
     assert "Preregistration" not in (written_to / "report.html").read_text(encoding="utf-8")

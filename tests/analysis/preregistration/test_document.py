@@ -1,10 +1,13 @@
 """The preregistration's text: everything from the protocol, the same bytes each time."""
 
+import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
+from study_app.analysis.contrasts import inclusion_text
 from study_app.analysis.planning.preregistration import (
     FILE,
     _interval_lines,
@@ -15,6 +18,7 @@ from study_app.analysis.planning.preregistration import (
 from study_app.analysis.planning.threshold_studies import BATCH, threshold_markdown
 from study_app.cli import commands
 from study_app.protocol.load import load, parse
+from study_app.protocol.model import Contrast
 from study_app.protocol.source.files import protocol_hash, shipped, source_bytes
 from tests.analysis.power.test_threshold_power import swept
 from tests.protocol.edited_studies import text_of
@@ -31,7 +35,7 @@ HEADS = (
 )
 
 
-def written(*words: str) -> str:
+def written_preregistration(*words: str) -> str:
     result = CliRunner().invoke(commands, ["preregister", *words])
     assert result.exit_code == 0, result.output
     return result.output
@@ -40,7 +44,7 @@ def written(*words: str) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
 def test_every_shipped_study_has_all_sections_and_its_hash(name: str, tmp_path: Path) -> None:
-    text = written(name)
+    text = written_preregistration(name)
     places = [text.index(f"\n## {head}\n") for head in HEADS]
     assert places == sorted(places)
     digest = protocol_hash(source_bytes(name))
@@ -67,7 +71,9 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
         "are the data unblinded and tested. The goal is a 95 % interval for the group mean no wider than ±20 %." in text
     )
     assert "we simulated 50 trials per standard" in text
-    assert "- Block “Viscosity” compares levels of damping. The trial order is drawn for each session.\n" in text
+    assert (
+        "- Block “Viscosity” compares levels of damping at the hand. The trial order is drawn for each session." in text
+    )
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "the trial is repeated, for up to 3 presentations in total" in text
     assert "Hartung–Knapp 95 % interval if there are at least 3 participants" in text
@@ -79,9 +85,9 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
 )
 def test_the_exponent_is_asked_for_with_two_standards_or_more(standards: str, at: str) -> None:
     protocol = study(("standards = [1, 2]", f"standards = {standards}"))
-    asked = list(_interval_lines(protocol, protocol.blocks["viscosity"]))
-    assert asked[0].startswith(f"Block “Viscosity”: what is the Weber fraction for viscosity at {at}? ")
-    assert ["proportional to the standard" in question for question in asked[1:]] == [True] * (at != "1 Pa·s")
+    lines = list(_interval_lines(protocol, protocol.blocks["viscosity"]))
+    assert lines[0].startswith(f"Block “Viscosity”: what is the Weber fraction for viscosity at {at}? ")
+    assert ["proportional to the standard" in question for question in lines[1:]] == [True] * (at != "1 Pa·s")
 
 
 def test_a_study_of_ratings_states_d_a_and_how_precise_it_is_expected_to_be() -> None:
@@ -108,15 +114,15 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
 
 def test_the_tables_of_power_are_included(tmp_path: Path) -> None:
     (tmp_path / "power.md").write_text(
-        "# Power for Feeling (rek2024 1.0)\n\n## Delays\n\n| n |\n", encoding="utf-8", newline="\n"
+        "# Power for Feeling (rek2024 1.1)\n\n## Delays\n\n| n |\n", encoding="utf-8", newline="\n"
     )
-    text = written("rek2024", "--power", str(tmp_path))
-    assert "\n### Power for Feeling (rek2024 1.0)\n\n#### Delays\n\n| n |\n\n## Exclusions\n" in text
+    text = written_preregistration("rek2024", "--power", str(tmp_path))
+    assert "\n### Power for Feeling (rek2024 1.1)\n\n#### Delays\n\n| n |\n\n## Exclusions\n" in text
     assert "Power was not computed" not in text
 
 
 @pytest.mark.parametrize(
-    ("content", "line"), [(None, "power.md cannot be read"), ("# Power for x (y 1)", "was not written for rek2024 1.0")]
+    ("content", "line"), [(None, "power.md cannot be read"), ("# Power for x (y 1)", "was not written for rek2024 1.1")]
 )
 def test_a_folder_without_this_studys_power_is_a_usage_error(content: str | None, line: str, tmp_path: Path) -> None:
     if content is not None:
@@ -126,10 +132,10 @@ def test_a_folder_without_this_studys_power_is_a_usage_error(content: str | None
     assert line in " ".join(result.output.split())
 
 
-def test_it_is_written_into_a_folder(tmp_path: Path) -> None:
+def test_a_preregistration_is_written_into_a_folder(tmp_path: Path) -> None:
     to = tmp_path / "results" / "demo"
-    assert written("demo", "--to", str(to)).strip() == str(to / FILE)
-    assert (to / FILE).read_text(encoding="utf-8") == written("demo")
+    assert written_preregistration("demo", "--to", str(to)).strip() == str(to / FILE)
+    assert (to / FILE).read_text(encoding="utf-8") == written_preregistration("demo")
 
 
 DISCRIMINATION = """
@@ -159,7 +165,7 @@ repetitions = 18
 """
 
 
-def test_a_study_of_d_prime_states_only_what_applies_to_it_and_its_precision_once() -> None:
+def test_a_d_prime_preregistration_omits_other_measures_and_states_its_precision_once() -> None:
     protocol = parse(DISCRIMINATION.encode(), "discrimination.toml")
     text = preregistration(protocol, "0" * 64)
     assert "- Block “Prompt”: how well can slime be discriminated from water (d′)?" in text
@@ -169,10 +175,43 @@ def test_a_study_of_d_prime_states_only_what_applies_to_it_and_its_precision_onc
     for other in ("threshold", "speed of the target", "delivered level", "delay difference", "Primary"):
         assert other not in text
     assert text.count("for 14 participants") == 2  # once for each block
-    found = swept(protocol, (), (14,), BATCH)
-    tables = preregistration(protocol, "0" * 64, threshold_markdown(found))
+    precisions = swept(protocol, (), (14,), BATCH)
+    tables = preregistration(protocol, "0" * 64, threshold_markdown(precisions))
     assert "for 14 participants" not in tables
-    assert f"| ±{100 * found.found['late', 18].half(0):.0f} % |" in tables
+    assert f"| ±{100 * precisions.found['late', 18].half(0):.0f} % |" in tables
+
+
+ADJUSTMENT = """
+format = 2
+sequence = ["training", "late"]
+study.name = "late"
+liquids.water.density_kg_m3 = 998
+tasks.move = { kind = "explore", min_s = 2, max_s = 6, instruction = "Stir." }
+stimuli.delay = { vary = "delay_ms", level = "value", levels = [1, 300], spacing = "linear" }
+stimuli.clear = { vary = "delay_ms", standards = [0], levels = [50, 300] }
+methods.few = { kind = "constant", levels = [200], repetitions = 10 }
+designs.notice = { kind = "adjustment", standard = false }
+designs.lag = { kind = "yesno", feedback = "always" }
+blocks.late = { stimulus = "delay", design = "notice", method = "adjustment" }
+[blocks.training]
+phase = "practice"
+stimulus = "clear"
+design = "lag"
+method = "few"
+until = { right = 8, of = 10, missed = "end" }
+"""
+
+
+def test_settings_without_a_standard_and_the_practice_are_described() -> None:
+    text = preregistration(parse(ADJUSTMENT.encode(), "late.toml"), "0" * 64)
+    assert "Block “Late” compares levels of visual delay." in text
+    assert (
+        "The practice block “Training” has at most 14 trials, which are not analysed. The block ends as soon as 8 of "
+        "the last 10 answers are correct; if this never happens, the session ends. Feedback is given after every trial."
+    ) in text
+    assert "for each participant, we report the mean of the settings, their standard deviation, and the diff" in text
+    assert "Settings that the time limit ended, or that lie at an end of the range, are included" in text
+    assert not [words for words in ("subjective equality", "constant error") if words in text]
 
 
 def test_limits_of_levels_are_stated_if_levels_vary() -> None:
@@ -308,3 +347,74 @@ def test_the_analysis_of_a_block_of_levels_is_that_of_its_kind_of_answer(
     analysis = next(line for line in text.splitlines(keepends=True) if line.startswith(f"{title}for each"))
     assert f"{title}{question}\n" in text
     assert sentence in analysis
+
+
+@pytest.mark.parametrize(
+    ("contrasts", "available"),
+    [
+        ([{"groups": ("old", "young")}], "their value is available"),
+        ([{"conditions": ("thin", "thick")}], "both of their values are available"),
+        ([{"conditions": ("thin", "thick"), "groups": ("old", "young")}], "both of their values are available"),
+        ([{"groups": ("old", "young")}, {"conditions": ("thin", "thick")}], "all of their compared values are"),
+    ],
+)
+def test_participants_of_groups_contribute_one_value(contrasts: list[dict[str, Any]], available: str) -> None:
+    stated = [Contrast.model_validate({"measure": "warm", "blocks": ("near",), **keys}) for keys in contrasts]
+    assert f"Participants are included if {available}" in inclusion_text(stated)
+
+
+def test_the_rules_of_staircases_are_stated() -> None:
+    stairs = 'kind = "updown", tracks = 2, trials = 80, begin = [0.8, 0.2], stop = { reversals = 10, after = 20 }'
+    levels = re.sub(
+        r'kind = "constant"\n.*\n.*', stairs.replace(", ", "\n", 3).replace("], ", "]\n"), text_of("levels")
+    )
+    text = preregistration(parse(levels.encode(), "levels.toml"), "0" * 64)
+    assert (
+        "- Block “Viscosity”: levels are chosen in 2 interleaved tracks of at most 40 comparisons per standard, "
+        "starting at 0.8 and 0.2, with steps up by a factor of 1.23 and down by a factor of 1.12, each ending after "
+        "10 reversals and at least 20 answers."
+    ) in text
+
+
+CHOICES = """
+format = 2
+study.name = "choices"
+liquids.water.density_kg_m3 = 998
+liquids.slime.density_kg_m3 = 1200
+tasks.stir = { kind = "explore", min_s = 2, max_s = 6, instruction = "Stir." }
+[questionnaires.which]
+intro = "Which one was it?"
+[[questionnaires.which.items]]
+id = "name"
+kind = "choice"
+text = "Which liquid was it?"
+short = "Liquid"
+options = [{ id = "water", text = "Water" }, { id = "slime", text = "Slime" }]
+[blocks.identify]
+conditions = ["water", "slime"]
+questionnaire = "which"
+order = "shuffled"
+"""
+
+
+def test_only_the_kinds_of_answers_in_the_study_are_summarised() -> None:
+    text = preregistration(parse(CHOICES.encode(), "choices.toml"), "0" * 64)
+    assert "but do not test them. We count how often each option is chosen." in text
+    assert "Power was not computed" not in text
+    sure = '[[questionnaires.which.items]]\nid = "sure"\nkind = "slider"\nlow = "No"\nhigh = "Yes"\n'
+    sure += 'text = "Sure?"\nshort = "Sure"\n'
+    contrast = (
+        '[analysis]\ncontrasts = [{ measure = "sure", blocks = ["identify"], conditions = ["water", "slime"] }]\n'
+    )
+    tested = CHOICES.replace("[blocks.identify]", f"{sure}[blocks.identify]") + contrast
+    text = preregistration(parse(tested.encode(), "choices.toml"), "0" * 64)
+    assert "We report the mean of each rating and number across participants with its 95 % confidence interval" in text
+    assert "mean score" not in text
+    assert "`liquid-study power choices --to DIR` computes it" in text
+
+
+def test_a_preference_is_not_called_discrimination() -> None:
+    chosen = DISCRIMINATION.replace('design = "abx"', 'design = "2ifc"')
+    text = preregistration(parse(chosen.encode(), "discrimination.toml"), "0" * 64)
+    assert "- Block “Late”: how often is late_slime chosen rather than late_water (d′, which is negative if" in text
+    assert "be discriminated from" not in text

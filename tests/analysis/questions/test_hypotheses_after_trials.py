@@ -160,16 +160,16 @@ def test_the_first_page_states_the_scale_and_shows_each_value_once(study: Study)
     assert thickness.sentences[0].endswith("The scale ranges from 0 to 100.")
     assert warmth.question == "Hypothesis 2: “Warmth” differs between First and Second"
     assert warmth.sentences[0].endswith("The scale ranges from 1 to 9.")
-    assert total.question == "Hypothesis 3: Both score differs between water and honey in First"
+    assert total.question == "Hypothesis 3: The both score differs between water and honey in First"
     assert total.sentences[0].endswith("The scale ranges from 1 to 109.")
     first, second = others
     assert not any("The mean both score" in sentence for sentence in first.sentences), "hypothesis 3 shows it"
     assert any("The mean both score" in sentence for sentence in second.sentences)
 
 
-def test_the_preregistration_states_only_what_is_tested(study: Study) -> None:
+def test_the_preregistration_states_only_the_tested_hypotheses(study: Study) -> None:
     text = preregistration(parse(FILE.encode(), "line.toml"), "hash")
-    assert "- Hypothesis: both score differs between water and honey in block “First”." in text
+    assert "- Hypothesis: the both score differs between water and honey in block “First”." in text
     assert (
         "- We describe the answers to the questions in block “First” and block “Second”, but do not test them except "
         "in the hypotheses above." in text
@@ -237,5 +237,5 @@ def test_only_statements_have_agreement() -> None:
     protocol = parse(FILE.encode(), "line.toml")
     slider = Contrast(measure="thick", blocks=("first",), conditions=("honey", "water"))
     assert not protocol.compares_statement(slider)
-    assert protocol.measure_words(slider) == "“thick”"
-    assert protocol.measure_words(Contrast(blocks=("first", "second"))) == "threshold"
+    assert protocol.measure_text(slider) == "“thick”"
+    assert protocol.measure_text(Contrast(blocks=("first", "second"))) == "threshold"

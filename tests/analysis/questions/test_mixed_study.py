@@ -48,10 +48,10 @@ def study(folder: Path) -> Study:
 
 
 def test_only_the_scale_of_an_answer_has_ends(study: Study) -> None:
-    asked = {question.id: question for question in study.others.questions}
+    questions = {question.id: question for question in study.others.questions}
     ends = {"age": None, "since": None, "comment": None, "thickness": (1, 5), "pleasant": (0, 100), "effort": (0, 100)}
-    assert {name: asked[name].scale_ends for name in ends} == ends
-    assert asked["age"].bounds == (16, 99)
+    assert {name: questions[name].scale_ends for name in ends} == ends
+    assert questions["age"].bounds == (16, 99)
 
 
 def test_answers_that_are_given_missing_and_off_the_scale_are_counted(study: Study) -> None:
@@ -61,9 +61,9 @@ def test_answers_that_are_given_missing_and_off_the_scale_are_counted(study: Stu
     answered.loc[place.index[place < 3], ["response", "value"]] = pd.NA
     answered.loc[place.index[place.isin([1, 2])], "cannot_judge"] = True
     results = evaluate(replace(study, answered=answered), recordings=False)
-    (found,) = (result for result in results.questions if result.item == "thickness")
+    (thickness,) = (result for result in results.questions if result.item == "thickness")
     counts = {"n": 3, "participants": 3, "cannot_judge": 2, "missing": 1}
-    assert [{name: group.numbers[name] for name in counts} for group in found.groups] == [counts] * 2
+    assert [{name: group.numbers[name] for name in counts} for group in thickness.groups] == [counts] * 2
 
 
 def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None:
@@ -73,22 +73,22 @@ def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None
         protocol, participants=8, seed=1, results=tmp_path / "results", features=made_up(protocol)
     )
     sessions = StudyFolder(folder).sessions()
-    asked = len(load_study(folder).answered.query("item == 'pleasant'"))
-    assert 0 < asked < 2 * len(sessions)  # hidden from some
+    answered = len(load_study(folder).answered.query("item == 'pleasant'"))
+    assert 0 < answered < 2 * len(sessions)  # hidden from some
     assert [reproduce_session(session.path).differences for session in sessions] == [[]] * 8
     assert verify_study(folder).errors == ()
 
 
-def test_excluded_session_counts_in_no_form(folder: Path, tmp_path: Path) -> None:
+def test_answers_of_an_excluded_session_do_not_count(folder: Path, tmp_path: Path) -> None:
     copied = tmp_path / "copied"
     shutil.copytree(folder, copied)
     exclude(copied, "P002", 1, by="AB", reason="asleep")
     left = load_study(copied)
-    asked = next(one for one in left.others.questions if one.id == "age")
-    assert len(left.answers_to(asked)) == PEOPLE - 1
+    age_question = next(question for question in left.others.questions if question.id == "age")
+    assert len(left.answers_to(age_question)) == PEOPLE - 1
 
 
-@pytest.mark.usefixtures("figures_of_the_page")
+@pytest.mark.usefixtures("png_figures_only")
 @pytest.mark.parametrize("order", ["fixed", "balanced", "random", "groups"])
 def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, order: str) -> None:
     grouped = order == "groups"
@@ -99,8 +99,8 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     old = 'sequence = ["start", "stir", "load", "usability", "end"]'
     sequence = (old, "" if grouped else f"sequence = {orders[0]}"), (last, f"{last}\n{again}{groups}")
     name = 'name = "mixed"'
-    named = (name, name if grouped else f'{name}\nblock_order = "{order}"')
-    protocol = mixed_file(tmp_path, *sequence, named)
+    name_edit = (name, name if grouped else f'{name}\nblock_order = "{order}"')
+    protocol = mixed_file(tmp_path, *sequence, name_edit)
     folder = rehearse_answers(
         protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=made_up(protocol)
     )
@@ -115,9 +115,9 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     first = PEOPLE // 2 if grouped else PEOPLE
     n = {"At the start": first, "After Stir": PEOPLE, "After Again": PEOPLE}
     results = evaluate(study)
-    found = next(one for one in results.questions if (one.where, one.item) == ("load", "effort"))
-    assert {group.name: group.numbers["n"] for group in found.groups} == n
-    score = next(one for one in results.scores if one.where == "load")
+    effort = next(question for question in results.questions if (question.where, question.item) == ("load", "effort"))
+    assert {group.name: group.numbers["n"] for group in effort.groups} == n
+    score = next(score for score in results.scores if score.where == "load")
     assert {group.name: group.numbers["n"] for group in score.groups} == n
     table, _ = wide_table(study)
     rows = study.answered.query("form == 'load' and item == 'effort'").set_index("participant")
@@ -141,7 +141,7 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
 def test_a_form_in_each_of_two_sessions_is_analysed_session_by_session(
     tmp_path: Path, blocks: tuple[str, str], uses: dict[str, str]
 ) -> None:
-    """Every participant counts once in each; the questionnaire has a question with options and a text, too."""
+    """Each participant counts once per session; the form also has a question with options and a text question."""
     last = 'conditions = ["thin", "thick"]'
     old = 'sequence = ["start", "stir", "load", "usability", "end"]'
     steps = ", ".join(f'["{block}", "load", "start"]' for block in blocks)
@@ -161,8 +161,8 @@ def test_a_form_in_each_of_two_sessions_is_analysed_session_by_session(
         assert (group.numbers["mean"], group.numbers["sd"]) == pytest.approx((raw[session].mean(), raw[session].std()))
     table, _ = wide_table(study)
     for session, code in enumerate(uses, start=1):
-        given = table.frame[f"load__raw__{code}"].astype(float).to_list()
-        assert given == pytest.approx(raw[session].reindex(table.frame["participant"]).to_list())
+        cells = table.frame[f"load__raw__{code}"].astype(float).to_list()
+        assert cells == pytest.approx(raw[session].reindex(table.frame["participant"]).to_list())
     hands = study.answered[study.answered["item"] == "hand"]
     (hand,) = (result for result in results.questions if result.item == "hand")
     assert [group.numbers["counts"] for group in hand.groups] == [
@@ -193,9 +193,9 @@ def test_readers_see_the_name_of_a_standard_questionnaire_in_place_of_its_title(
     }
 
 
-@pytest.mark.usefixtures("figures_of_the_page")
-def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Simulated people, who have one opinion of the task load, answer at random, so that the blocks differ."""
+@pytest.mark.usefixtures("png_figures_only")
+def test_blocks_with_the_same_title_have_distinct_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Answers are random, because a simulated participant rates the task load of all blocks alike."""
     monkeypatch.setattr(questions.SliderView, "simulated", lambda _self, _opinion, draw: 5 * int(20 * draw()))
     again = '[blocks.again]\ntitle = "Stir"\nconditions = ["thin", "thick"]'
     last = 'conditions = ["thin", "thick"]'
@@ -218,23 +218,25 @@ def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path, monkeypatch: p
     first, second = means.values()
     assert first != second
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
-    said = re.search(
+    match = re.search(
         r"score was (\S+) \[[^]]+\] after Stir \(stir\) and (\S+) \[[^]]+\] after Stir \(again\) .* "
         r"difference \(after Stir \(stir\) − after Stir \(again\)\) was (\S+) \[",
         page,
     )
-    assert said is not None
-    assert [float(word.replace("−", "-")) for word in said.groups()] == pytest.approx(
+    assert match is not None
+    assert [float(word.replace("−", "-")) for word in match.groups()] == pytest.approx(
         [first, second, first - second], rel=5e-3
     )
-    asked = [f"question-{question['where']}-{question['item']}.png" for question in content["results"]["questions"]]
-    assert len(asked) == 8, "two after each trial and those of the NASA-TLX"
-    assert sorted(asked) == sorted(path.name for path in (tmp_path / "report").glob("question-*.png"))
+    figure_names = [
+        f"question-{question['where']}-{question['item']}.png" for question in content["results"]["questions"]
+    ]
+    assert len(figure_names) == 8, "two after each trial and those of the NASA-TLX"
+    assert sorted(figure_names) == sorted(path.name for path in (tmp_path / "report").glob("question-*.png"))
 
 
 @pytest.mark.parametrize("order", ["balanced", "random"])
 def test_a_form_after_the_last_of_exchanged_blocks_has_all_its_answers(tmp_path: Path, order: str) -> None:
-    """It comes after either block, though the file writes it after one of them."""
+    """The form follows either block, although the file places it after one of them."""
     last = 'conditions = ["thin", "thick"]'
     sequence = 'sequence = ["start", "stir", "load", "usability", "end"]'
     protocol = mixed_file(
@@ -254,9 +256,11 @@ def test_a_form_after_the_last_of_exchanged_blocks_has_all_its_answers(tmp_path:
     assert min(counts["stir"], counts["again"]) > 0
     table, _ = wide_table(study)
     assert {code: table.frame[f"load__effort__{code}"].count() for code in counts} == counts
-    found = next(one for one in evaluate(study).questions if (one.where, one.item) == ("load", "effort"))
+    effort = next(
+        question for question in evaluate(study).questions if (question.where, question.item) == ("load", "effort")
+    )
     words = {"0": "At the start", "stir": "After Stir", "again": "After Again"}
-    assert {group.name: group.numbers["n"] for group in found.groups} == {words[code]: n for code, n in counts.items()}
+    assert {group.name: group.numbers["n"] for group in effort.groups} == {words[code]: n for code, n in counts.items()}
 
 
 def test_the_methods_describe_a_block_without_statements(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from tests.analysis.report.report_numbers import (
     Check,
     N,
     R,
-    Told,
+    ReportNumbers,
     always,
     count,
     fewest,
@@ -22,24 +22,24 @@ from tests.analysis.report.report_numbers import (
 )
 
 
-def claims(match: re.Match[str], told: Told) -> bool:
+def claims(match: re.Match[str], report: ReportNumbers) -> bool:
     """Check the rate of empty studies that claim something."""
     studies, n, percent, reports = (match[place] for place in (1, 2, 3, 4))
     return CLAIMS[int(n)] == (int(reports), int(studies)) and is_number(percent, 100 * int(reports) / int(studies))
 
 
-def too_few_for_equivalence(match: re.Match[str], told: Told) -> bool:
+def too_few_for_equivalence(match: re.Match[str], report: ReportNumbers) -> bool:
     """Check the least number of participants."""
-    first = told.against[0]["found"]
+    first = report.against[0]["found"]
     return is_number(match[1], first["bound"]) and int(match[2]) == fewest(
         first["alpha"], min(1 / 5, first["bound"] / 6)
     )
 
 
-def missed_minority(match: re.Match[str], told: Told) -> bool:
+def missed_minority(match: re.Match[str], report: ReportNumbers) -> bool:
     """Check the chance of missing a minority, and its size."""
     chance, share, points = match.groups()
-    first = told.against[0]["found"]
+    first = report.against[0]["found"]
     minority = min(1 / 5, first["bound"] / 6)
     return (
         (is_number(chance, 100 * first["alpha"]) or (chance == "0.1" and first["alpha"] < 0.001))
@@ -48,65 +48,66 @@ def missed_minority(match: re.Match[str], told: Told) -> bool:
     )
 
 
-def nobody_is_left(match: re.Match[str], told: Told) -> bool:
+def nobody_is_left(match: re.Match[str], report: ReportNumbers) -> bool:
     """Check that so many comparisons are inconclusive."""
-    bound = told.against[0]["found"]["bound"]
-    counts = (int(match[1]), int(match[2])) == (inconclusive(told), len(told.against))
+    bound = report.against[0]["found"]["bound"]
+    counts = (int(match[1]), int(match[2])) == (inconclusive(report), len(report.against))
     return counts and is_number(match[3], bound)
 
 
-def out_of_reach(match: re.Match[str], told: Told) -> bool:
+def out_of_reach(match: re.Match[str], report: ReportNumbers) -> bool:
     """Check that the named statements are those that no answers could have shown."""
-    rows = [row for row in told.of_statements if row["verdict"] == "out of reach"]
+    rows = [row for row in report.of_statements if row["verdict"] == "out of reach"]
     return names_in(match[1]) == {row["item"] for row in rows} and all(
-        float(row["p_adjusted"]) > told.alpha for row in rows
+        float(row["p_adjusted"]) > report.alpha for row in rows
     )
 
 
-def not_testable(match: re.Match[str], told: Told) -> bool:
+def not_testable(match: re.Match[str], report: ReportNumbers) -> bool:
     """Check that the named statements have no p."""
-    return names_in(match[1]) <= {row["item"] for row in told.of_statements if not row["p"]}
+    return names_in(match[1]) <= {row["item"] for row in report.of_statements if not row["p"]}
 
 
-def same_position(match: re.Match[str], told: Told) -> bool:
+def same_position(match: re.Match[str], report: ReportNumbers) -> bool:
     """Check that a setting has been in this position in all orders."""
-    orders = told.results["orders"]["b"]
-    delays = [one["delay_ms"] for one in told.block["settings"]]
+    orders = report.results["orders"]["b"]
+    delays = [setting["delay_ms"] for setting in report.block["settings"]]
     names = [
-        f"{one['delay_ms']:g} ms" + (f" ({one['condition']})" if delays.count(one["delay_ms"]) > 1 else "")
-        for one in told.block["settings"]
+        f"{setting['delay_ms']:g} ms" + (f" ({setting['condition']})" if delays.count(setting["delay_ms"]) > 1 else "")
+        for setting in report.block["settings"]
     ]
-    names = names if told.block["kind"] == "delays" else told.block["names"]
-    codes = {one["code"] for name, one in zip(names, told.block["settings"], strict=True) if name == match[1]}
+    names = names if report.block["kind"] == "delays" else report.block["names"]
+    codes = {setting["code"] for name, setting in zip(names, report.block["settings"], strict=True) if name == match[1]}
     counts = dict(zip(orders["codes"], orders["positions"][int(match[2]) - 1], strict=True))
     return any(counts[code] == orders["orders"] for code in codes)
 
 
-def not_computed(match: re.Match[str], told: Told) -> bool:
-    """Check that the reason is one of those that the block gives."""
-    return match[2] in {one["why"] for one in told.block["absent"]}
+def not_computed(match: re.Match[str], report: ReportNumbers) -> bool:
+    """Check that the block states this reason."""
+    return match[2] in {absence["why"] for absence in report.block["absent"]}
 
 
 LIMITS: Final[Sequence[tuple[str, Check]]] = (
     (rf"In (\d+) simulated studies with (\d+) participants, three liquids, seven delays and no true effect, {R} % of "
      rf"the reports claimed a difference or a noticed delay \((\d+) reports, 95 % confidence interval {R} to {R} %; "
      r"liquid-study validate-report\)\.", claims),
-    (r"No answers are included yet\.", when(lambda told: told.block["n"] == 0)),
-    (rf"{LEAD}no answers are included yet\.", when(lambda told: told.block["n"] == 0)),
+    (r"No answers are included yet\.", when(lambda report: report.block["n"] == 0)),
+    (rf"{LEAD}no answers are included yet\.", when(lambda report: report.block["n"] == 0)),
     (r"Block presents only one (?:liquid|delay|condition), so its ratings are not compared\.",
-     when(lambda told: len(told.block["settings"]) == 1)),
+     when(lambda report: len(report.block["settings"]) == 1)),
     (r"The participants were SIMULATED, so this report is not evidence about people\.",
-     when(lambda told: told.study.simulated)),
+     when(lambda report: report.study.simulated)),
     (r"No analysis was planned in the study file, so all results are exploratory\.",
-     when(lambda told: not told.results["decided"]["made"])),
+     when(lambda report: not report.results["decided"]["made"])),
     (r"The decisions about the analysis changed between sessions, so all results are exploratory; the decisions from "
-     r"the first session (are used|were used \(alpha = .*\))\.", when(lambda told: told.results["decided"]["changed"])),
+     r"the first session (are used|were used \(alpha = .*\))\.",
+     when(lambda report: report.results["decided"]["changed"])),
     (r"There is only one participant, so the results do not generalise to other people\.",
-     when(lambda told: people(told) == 1)),
+     when(lambda report: people(report) == 1)),
     (r"Intervals for mean rank correlations and exploratory tests of means need at least 10 participants; this study "
-     r"has (\d+)\.", lambda match, told: int(match[1]) == people(told) < 10),
+     r"has (\d+)\.", lambda match, report: int(match[1]) == people(report) < 10),
     (r"Interactions between groups and blocks or conditions are not tested\.",
-     when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
+     when(lambda report: {contrast["contrast"]["groups"] is None for contrast in report.contrasts} == {True, False})),
     (r"Effects that this report does not show may still exist\.", always),
     (rf"{LEAD}(the .*?) (?:was|were) not computed because (.*)\.", not_computed),
     (rf"{LEAD}the tests for (.*) could not have been significant with so few participants, because no rearrangement of "
@@ -121,7 +122,7 @@ LIMITS: Final[Sequence[tuple[str, Check]]] = (
      rf"population; if the answers of such a minority differ by {R} points, they shift the mean by as much as the "
      r"bound\.", missed_minority),
     (rf"This study has {N} participants?(, so it can show only that a mean answer differs by more)?\.",
-     lambda match, told: count(match[1]) == told.block["n"]),
+     lambda match, report: count(match[1]) == report.block["n"]),
     (rf"{LEAD}in (\d+) of (\d+) comparisons? with .* ms \(one for each statement and delay\), the data show "
      rf"neither that the mean answer stays within ±{R} points? nor that it differs by more\.", nobody_is_left),
 )  # fmt: skip

@@ -22,7 +22,7 @@ FORBIDDEN = re.compile(
 
 
 class Text(HTMLParser):
-    """Collects what a reader sees, and checks that every element ends where it should."""
+    """Collect the visible text, and check that every element is closed correctly."""
 
     VOID = frozenset({"meta", "img", "br"})
 
@@ -49,7 +49,7 @@ class Text(HTMLParser):
 
 
 def seen(html: str) -> str:
-    """Return what a reader of this HTML sees, having checked that it is whole and has no scripts."""
+    """Return the visible text of HTML; check that its elements are closed and that it has no scripts."""
     page = Text()
     page.feed(html)
     assert page.open == []
@@ -59,18 +59,20 @@ def seen(html: str) -> str:
 
 
 def read(folder: Path) -> str:
-    """Return what the page tells."""
-    told = seen((folder / "report.html").read_text(encoding="utf-8"))
-    assert (found := FORBIDDEN.search(told)) is None, told[max(0, found.start() - 80) : found.end() + 40]
-    return told
+    """Return the visible text of the report page."""
+    visible_text = seen((folder / "report.html").read_text(encoding="utf-8"))
+    assert (match := FORBIDDEN.search(visible_text)) is None, visible_text[
+        max(0, match.start() - 80) : match.end() + 40
+    ]
+    return visible_text
 
 
 def numbers(folder: Path) -> dict[str, Any]:
     def refuse(constant: str) -> None:
         raise AssertionError(constant)
 
-    told: dict[str, Any] = json.loads((folder / "report.json").read_bytes(), parse_constant=refuse)
-    return told
+    content: dict[str, Any] = json.loads((folder / "report.json").read_bytes(), parse_constant=refuse)
+    return content
 
 
 def rows(folder: Path, name: str) -> list[dict[str, str]]:

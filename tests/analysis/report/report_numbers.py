@@ -29,28 +29,28 @@ DECIDED: Final = ("shown", "suggested")
 
 
 @dataclass(frozen=True)
-class Told:
-    """A study and what its report holds in numbers."""
+class ReportNumbers:
+    """A study and the numbers in its report."""
 
     study: Study
-    found: Results
+    evaluated: Results
     only: int | None = None
     """The hypothesis that the sentences are about; None: all of them."""
 
     @cached_property
     def results(self) -> dict[str, Any]:
         """The results in report.json."""
-        return json.loads(json.dumps(as_json_types(self.found)))  # type: ignore[no-any-return]
+        return json.loads(json.dumps(as_json_types(self.evaluated)))  # type: ignore[no-any-return]
 
     @cached_property
     def rows(self) -> list[dict[str, str]]:
         """The rows of tests.csv."""
-        rows = csv.DictReader(io.StringIO(tests_csv(self.found).decode()))
+        rows = csv.DictReader(io.StringIO(tests_csv(self.evaluated).decode()))
         return [{name: "" if cell == "n/a" else cell for name, cell in row.items()} for row in rows]
 
     @property
     def block(self) -> dict[str, Any]:
-        """The one block."""
+        """Return the only block."""
         return self.results["blocks"][0]  # type: ignore[no-any-return]
 
     @property
@@ -72,31 +72,31 @@ class Told:
     @property
     def of_statements(self) -> list[dict[str, str]]:
         """The tests of single statements that the test over all statements gates."""
-        return [*self.asked("conditions differ"), *self.asked("answers follow the delay")]
+        return [*self.test_rows("conditions differ"), *self.test_rows("answers follow the delay")]
 
     @property
     def p_over_all(self) -> float:
         """The p of the test over all statements."""
-        return float(self.asked("conditions differ, all statements")[0]["p"])
+        return float(self.test_rows("conditions differ, all statements")[0]["p"])
 
-    def asked(self, question: str) -> list[dict[str, str]]:
+    def test_rows(self, question: str) -> list[dict[str, str]]:
         """Return the rows of tests.csv that answer a question."""
         return [row for row in self.rows if row["question"] == question]
 
     def lowest(self) -> dict[str, float]:
         """Return of each statement with a trend the shortest delay whose steps are all significant, by item."""
-        trends = {row["item"]: row for row in self.asked("answers follow the delay")}
-        found = {}
-        for row in self.asked("answers change with the delay, step-down test"):
+        trends = {row["item"]: row for row in self.test_rows("answers follow the delay")}
+        delays = {}
+        for row in self.test_rows("answers change with the delay, step-down test"):
             step = float(row["comparison"].removeprefix("up to ").removesuffix(" ms"))
             if float(row["p"] or 1) > self.alpha / int(trends[row["item"]]["members"]):
-                found.setdefault(row["item"], math.nan)  # the first that fails ends them
-            elif not math.isnan(found.get(row["item"], 0.0)) or row["item"] not in found:
-                found[row["item"]] = step if not math.isnan(found.get(row["item"], step)) else math.nan
-        return found
+                delays.setdefault(row["item"], math.nan)  # the first that fails ends them
+            elif not math.isnan(delays.get(row["item"], 0.0)) or row["item"] not in delays:
+                delays[row["item"]] = step if not math.isnan(delays.get(row["item"], step)) else math.nan
+        return delays
 
 
-Check = Callable[[re.Match[str], Told], bool]
+Check = Callable[[re.Match[str], ReportNumbers], bool]
 
 
 def count(text: str) -> int:
@@ -118,11 +118,11 @@ def is_p(text: str, p: float) -> bool:
     return {"<": p < 0.001, ">": p > 0.999, "=": abs(p - float(number)) <= 0.0005 + 1e-9}[sign]
 
 
-def position(one: Mapping[str, Any]) -> str:
+def position(contrast: Mapping[str, Any]) -> str:
     """Return where the interval of a comparison lies: "within" the bound, "beyond" it, or "across"."""
-    ends, bound = one["found"]["interval"], one["found"]["bound"]
-    effect = one["found"]["effect"]
-    if ends is None and (effect is None or 0.5 ** one["found"]["n"] > one["found"]["alpha"]):
+    ends, bound = contrast["found"]["interval"], contrast["found"]["bound"]
+    effect = contrast["found"]["effect"]
+    if ends is None and (effect is None or 0.5 ** contrast["found"]["n"] > contrast["found"]["alpha"]):
         return "across"
     low, high = (effect, effect) if ends is None else (ends["low"], ends["high"])
     if low > bound + 1e-9 or high < -bound - 1e-9:
@@ -130,18 +130,20 @@ def position(one: Mapping[str, Any]) -> str:
     return "within" if -bound < low and high < bound else "across"
 
 
-def beyond(told: Told) -> int:
+def beyond(report: ReportNumbers) -> int:
     """Return how many comparisons lie beyond the bound."""
-    return sum(position(one) == "beyond" for one in told.against)
+    return sum(position(contrast) == "beyond" for contrast in report.against)
 
 
-def inconclusive(told: Told) -> int:
+def inconclusive(report: ReportNumbers) -> int:
     """Return how many comparisons are neither equivalent nor beyond the bound."""
-    return sum(one["found"]["verdict"] != "equivalent" and position(one) != "beyond" for one in told.against)
+    return sum(
+        contrast["found"]["verdict"] != "equivalent" and position(contrast) != "beyond" for contrast in report.against
+    )
 
 
 def fewest(alpha: float, share: float) -> int:
-    """Return of how many people at least one is of a minority, with a probability of 1 − alpha."""
+    """Return the smallest sample that includes at least one of a minority with probability 1 − alpha."""
     return next(n for n in range(1, 10_000) if binom.pmf(0, n, share) <= alpha * (1 + 1e-9))
 
 
@@ -155,26 +157,26 @@ def listed_in(text: str) -> set[str]:
     return set(re.split(r", | and ", text))
 
 
-def short_delay(told: Told) -> float:
+def short_delay(report: ReportNumbers) -> float:
     """Return the shortest delay."""
-    return min(one["delay_ms"] or 0.0 for one in told.block["settings"])
+    return min(setting["delay_ms"] or 0.0 for setting in report.block["settings"])
 
 
-def short_of(told: Told, item: str) -> str:
+def short_of(report: ReportNumbers, item: str) -> str:
     """Return the short text of a statement."""
-    return next(one["short"] for one in told.block["items"] if one["id"] == item)
+    return next(item_facts["short"] for item_facts in report.block["items"] if item_facts["id"] == item)
 
 
-def people(told: Told) -> int:
+def people(report: ReportNumbers) -> int:
     """Return how many participants have answers that count."""
-    return len(told.study.people)
+    return len(report.study.people)
 
 
-def always(_match: re.Match[str], _told: Told) -> bool:
+def always(_match: re.Match[str], _report: ReportNumbers) -> bool:
     """A sentence without a number from the study."""
     return True
 
 
-def when(holds: Callable[[Told], bool]) -> Check:
+def when(holds: Callable[[ReportNumbers], bool]) -> Check:
     """Return the check that something holds of the study."""
-    return lambda _match, told: holds(told)
+    return lambda _match, report: holds(report)

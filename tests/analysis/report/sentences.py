@@ -12,7 +12,7 @@ from tests.analysis.report.first_page_sentences import FIRST_PAGE
 from tests.analysis.report.hypothesis_sentences import HYPOTHESES
 from tests.analysis.report.limit_sentences import LIMITS
 from tests.analysis.report.methods_sentences import METHODS
-from tests.analysis.report.report_numbers import DECIDED, Check, Told, position
+from tests.analysis.report.report_numbers import DECIDED, Check, ReportNumbers, position
 
 TEMPLATES: Final[Sequence[tuple[str, Check]]] = (*FIRST_PAGE, *HYPOTHESES, *LIMITS, *METHODS)
 
@@ -22,23 +22,23 @@ def split(text: str) -> Iterator[str]:
     yield from (part.strip() for part in re.split(r"(?<=[.!?])\s+(?=[A-Z“\d])", text) if part.strip())
 
 
-def check(text: str, told: Told) -> None:
+def check(text: str, report: ReportNumbers) -> None:
     """Check every sentence of a text; a sentence without a template, or that is not true of the study, is a failure."""
     for sentence in split(text):
-        found = [(match, holds) for pattern, holds in TEMPLATES if (match := re.fullmatch(pattern, sentence))]
-        assert found, f"no template for: {sentence}"
-        match, holds = found[0]
-        assert holds(match, told), f"not true of the study: {sentence}"
+        matches = [(match, holds) for pattern, holds in TEMPLATES if (match := re.fullmatch(pattern, sentence))]
+        assert matches, f"no template for: {sentence}"
+        match, holds = matches[0]
+        assert holds(match, report), f"not true of the study: {sentence}"
 
 
-def check_verdicts(told: Told) -> None:
+def check_verdicts(report: ReportNumbers) -> None:
     """Check that the verdict of each row agrees with its p, or its interval."""
-    for one in told.against:
-        verdict = one["found"]["verdict"]
-        assert (position(one) == "beyond") == (verdict == "not equivalent"), one
-        assert verdict != "equivalent" or one["found"]["p"] <= one["found"]["alpha"], one
-    for row in told.rows:
+    for contrast in report.against:
+        verdict = contrast["found"]["verdict"]
+        assert (position(contrast) == "beyond") == (verdict == "not equivalent"), contrast
+        assert verdict != "equivalent" or contrast["found"]["p"] <= contrast["found"]["alpha"], contrast
+    for row in report.rows:
         if row["p_adjusted"] and row["verdict"] in ("shown", "suggested", "not shown", "out of reach"):
-            significant = float(row["p_adjusted"]) <= told.alpha
+            significant = float(row["p_adjusted"]) <= report.alpha
             assert significant == (row["verdict"] in DECIDED), row
             assert row["verdict"] != "shown" or row["primary"] == "true", row

@@ -24,8 +24,8 @@ IN = {name: Presented(f"In {name}, oil.", {"": ("“oil”", f"{delay} ms of vis
 
 def results_of(*blocks: BlockResult, **changes: Any) -> Any:
     """Return results without hypotheses, questions and levels."""
-    held = dict.fromkeys(("contrasts", "questions", "levels", "scores", "people"), ())
-    return SimpleNamespace(**{**held, "blocks": blocks, "decided": DECIDED, **changes})
+    fields = dict.fromkeys(("contrasts", "questions", "levels", "scores", "people"), ())
+    return SimpleNamespace(**{**fields, "blocks": blocks, "decided": DECIDED, **changes})
 
 
 def hypothesis(verdict: str = "shown", **stated: Any) -> ContrastResult:
@@ -33,12 +33,12 @@ def hypothesis(verdict: str = "shown", **stated: Any) -> ContrastResult:
     unknown = dict.fromkeys(
         ("statistic", "p", "effect", "interval", "p_adjusted", "p_bootstrap", "p_skewed", "p_equivalent", "higher")
     )
-    made: Any = ContrastResult(
+    contrast_result: Any = ContrastResult(
         test="t", n=3, dropped=0, statistic_name="t", effect_name="d", method="m", no_interval="", note="", members=1,
         contrast=Contrast.model_validate(stated), compared=("First", "Second"), ratio=False, verdict=verdict,  # type: ignore[arg-type]
         equivalent=None, not_excluded=None, left_out={}, **unknown,
     )  # fmt: skip
-    return made  # type: ignore[no-any-return]
+    return contrast_result  # type: ignore[no-any-return]
 
 
 THRESHOLD = {"measure": "threshold", "blocks": ("a", "b")}
@@ -52,24 +52,26 @@ def test_a_card_shows_the_first_of_its_figures_that_was_drawn_for_its_block() ->
     def card(*figures: str) -> Card:
         return Card(question="", verdict="", sentences=(), block="b", figures=figures)
 
-    drawn = [
+    pictures = [
         picture("threshold-a", "a"), picture("delays-a", "a"), picture("delays-b", "b"), picture("threshold-b", "b"),
         picture("hypothesis-1", "a"), picture("hypothesis-2", "b"),
     ]  # fmt: skip
-    shown = {
+    drawn_figures = {
         ("threshold", "delays"): "threshold-b",
         ("effects", "delays"): "delays-b",
         ("hypothesis-1",): "hypothesis-1",
         ("hypothesis-2",): "hypothesis-2",
         ("effects",): None,
     }
-    for figures, name in shown.items():
-        figure = card(*figures).figure_of(drawn)
+    for figures, name in drawn_figures.items():
+        figure = card(*figures).figure_of(pictures)
         assert (figure and figure.name) == name
-    assert pages.figures_shown([card(*figures) for figures in shown], drawn) == set(shown.values()) - {None}
+    assert pages.figures_shown([card(*figures) for figures in drawn_figures], pictures) == set(
+        drawn_figures.values()
+    ) - {None}
 
 
-def test_each_hypothesis_has_its_number_figure_and_the_blocks_that_no_earlier_one_introduced(
+def test_each_hypothesis_has_its_number_its_figure_and_the_newly_introduced_blocks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     contrasts = [
@@ -77,10 +79,10 @@ def test_each_hypothesis_has_its_number_figure_and_the_blocks_that_no_earlier_on
         hypothesis("not shown", measure="threshold", blocks=("b", "c")),
         hypothesis("shown", measure="threshold", blocks=("c", "x")),
     ]
-    monkeypatch.setattr(pages, "_question_words", lambda contrast, _presented: f"{contrast.verdict}?")
+    monkeypatch.setattr(pages, "_question_text", lambda contrast, _presented: f"{contrast.verdict}?")
     monkeypatch.setattr(pages, "answer", lambda contrast: f"{contrast.verdict}!")
-    monkeypatch.setattr(pages, "_scale_words", lambda contrast, *_: f" In {contrast.contrast.blocks[0]}.")
-    monkeypatch.setattr(pages, "_cell_words", lambda contrast: [f"Cells {contrast.contrast.blocks[1]}."])
+    monkeypatch.setattr(pages, "_scale_text", lambda contrast, *_: f" In {contrast.contrast.blocks[0]}.")
+    monkeypatch.setattr(pages, "_cell_sentences", lambda contrast: [f"Cells {contrast.contrast.blocks[1]}."])
     cards = list(pages._hypothesis_cards(results_of(contrasts=contrasts), IN))
     assert [(card.question, card.verdict, card.sentences, card.block, card.figures) for card in cards] == [
         ("Hypothesis 1: suggested?", "suggested", ("suggested! In a.", "Cells b.", "In a, oil. In b, oil."), "a",
@@ -113,8 +115,8 @@ def test_a_hypothesis_says_which_delays_set_its_sides_apart(
     of_conditions = {name: ("“oil”", f"{delay} ms of visual delay", "") for name, delay in (("thin", 5), ("wax", 9))}
     presented = {**IN, "d": Presented("", {"": ("“oil”", "", ""), **of_conditions})}
     monkeypatch.setattr(pages, "question", lambda contrast: (contrast.compared, contrast.within_names))
-    given = replace(hypothesis(**stated), within_names=("Early", "Late") if "groups" in stated else None)
-    assert pages._question_words(given, presented) == (compared, within)
+    comparison = replace(hypothesis(**stated), within_names=("Early", "Late") if "groups" in stated else None)
+    assert pages._question_text(comparison, presented) == (compared, within)
 
 
 @pytest.mark.parametrize(
@@ -143,7 +145,7 @@ def test_the_unit_or_scale_of_a_hypothesis_is_that_of_its_measure(
         for name, of_kind, unit in (("z", "value", "mm"), ("b", kind, "N·s/m"), ("a", kind, "N·s/m"))
     ]
     tested = replace(hypothesis(**stated), scale=scale)
-    assert pages._scale_words(tested, results_of(levels=levels)) == sentence
+    assert pages._scale_text(tested, results_of(levels=levels)) == sentence
 
 
 def test_each_group_has_its_own_means_of_an_interaction() -> None:
@@ -151,8 +153,8 @@ def test_each_group_has_its_own_means_of_an_interaction() -> None:
         ContrastSide(name=name, values={}, mean=mean, low=None, high=None, sd=None)
         for name, mean in (("Early", 1.5), ("Late", 2.5), ("Early", 3.5), ("Late", None))
     ]
-    given: Any = SimpleNamespace(compared=("old", "new"), cells=cells)
-    assert list(pages._cell_words(given)) == [
+    comparison: Any = SimpleNamespace(compared=("old", "new"), cells=cells)
+    assert list(pages._cell_sentences(comparison)) == [
         "Means in the group old (95 % intervals): 1.50 in Early and 2.50 in Late.",
         "Mean in the group new (95 % intervals): 3.50 in Early.",
     ]
@@ -203,7 +205,7 @@ def estimate(**values: Any) -> Any:
     return SimpleNamespace(**{"low": 0.25, "high": 0.75, "n": 8, **values})
 
 
-def test_only_estimates_that_no_hypothesis_shows_have_a_card(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_estimates_already_shown_by_a_hypothesis_have_no_card(monkeypatch: pytest.MonkeyPatch) -> None:
     levels = [
         SimpleNamespace(block=name, title=f"Task {name}", revealed=name not in "de", level_kind="value", unit="mm")
         for name in "abcde"
@@ -244,12 +246,12 @@ def test_estimates_name_their_standard_and_unit(
 ) -> None:
     level: Any = SimpleNamespace(level_kind=kind, unit="mm")
     group = [estimate(**{attribute: 0.5}, comparison=place, high=None) for place in places]
-    assert list(pages._estimate_words(level, group, attribute, "size")) == [
+    assert list(pages._estimate_sentences(level, group, attribute, "size")) == [
         f"The mean size{phrase} (no interval, n = 8)." for phrase in phrases
     ]
 
 
-def asked(where: str, item: str, *, n: int = 8, is_form: bool = True, weighs: bool = False) -> QuestionResult:
+def question_result(where: str, item: str, *, n: int = 8, is_form: bool = True, weighs: bool = False) -> QuestionResult:
     group = GroupAnswers(None, "All", {"n": n, "counts": {"yes": n - 1, "no": 1}})
     return QuestionResult(
         where=where, title=f"Title {where}", is_form=is_form, item=item, text="", short=item, kind="choice",
@@ -259,12 +261,13 @@ def asked(where: str, item: str, *, n: int = 8, is_form: bool = True, weighs: bo
 
 def test_questions_have_cards_by_place_with_scores_first_and_sample_last(monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks come first, then forms with scores, then other forms; questions of levels have no card here."""
-    monkeypatch.setattr(pages, "_number_words", lambda entry, presented: f"{entry.title} {len(presented)}")
-    monkeypatch.setattr(pages, "_choice_words", lambda result: f"chose {result.item}")
+    monkeypatch.setattr(pages, "_number_text", lambda entry, presented: f"{entry.title} {len(presented)}")
+    monkeypatch.setattr(pages, "_choice_text", lambda result: f"chose {result.item}")
     questions = [
-        asked("sample", "pick"), asked("sample", "age"), asked("load", "sure"), asked("load", "pair", weighs=True),
-        asked("track", "pick", is_form=False), asked("b", "pick", is_form=False), asked("none", "age", n=0),
-        asked("c", "age", is_form=False),
+        question_result("sample", "pick"), question_result("sample", "age"), question_result("load", "sure"),
+        question_result("load", "pair", weighs=True), question_result("track", "pick", is_form=False),
+        question_result("b", "pick", is_form=False), question_result("none", "age", n=0),
+        question_result("c", "age", is_form=False),
     ]  # fmt: skip
     single, pair = (("", {"P1": 1.0}),), (("Thin", {"P1": 1.0}), ("Wax", {"P1": 2.0}))
     numbers = {
@@ -301,10 +304,10 @@ def test_values_of_a_form_are_shown_by_a_hypothesis_with_all_participants(
     """P3 has a value after one block only, so the hypothesis names P3 or does not know of this participant."""
     values = {"P1": 1.0, "P2": 2.0}
     contrast = SimpleNamespace(form=form, measure=measure, blocks=("a", "b"), conditions=None)
-    given = SimpleNamespace(contrast=contrast, left_out=left_out, sides=[SimpleNamespace(values=values)] * 2)
+    comparison = SimpleNamespace(contrast=contrast, left_out=left_out, sides=[SimpleNamespace(values=values)] * 2)
     by_setting = (("After a", {**values, "P3": 3.0}), ("After b", values))
     raw = Numbers("Raw", (0.0, 100.0), True, by_setting, "raw", ("a", "b"), ("a", "b"))
-    assert pages._is_in_hypotheses(raw, "load", results_of(contrasts=[given])) is is_shown
+    assert pages._is_in_hypotheses(raw, "load", results_of(contrasts=[comparison])) is is_shown
 
 
 def test_the_first_page_has_the_look_the_cards_the_limits_and_the_rate_of_false_claims(
@@ -320,9 +323,9 @@ def test_the_first_page_has_the_look_the_cards_the_limits_and_the_rate_of_false_
     monkeypatch.setattr(pages, "answers", lambda _results: ("an answer",))
     monkeypatch.setattr(pages, "false_claims_sentence", lambda n: f"Of {n} people.")
     monkeypatch.setattr(pages, "picture", lambda figure, beside=False: f"{figure.name} {beside}")
-    drawn = [picture("late-b", "b")]
-    results = results_of(block("a", n=7), block("b", n=11), people=("P1",) * 15)
-    page = pages.first_page(results, ["Block b: few.", "No key."], {}, drawn, {})
+    pictures = [picture("late-b", "b")]
+    results = results_of(block("a", n=7), block("b", n=11, kind="delays"), people=("P1",) * 15)
+    page = pages.first_page(results, ["Block b: few.", "No key."], {}, pictures, {})
     assert '<span class="verdict not-shown">not significant</span>' in page
     assert "<p>p\u00a0=\u00a0.5, n\u00a0=\u00a012.</p>" in page
     lines = list(page_lines(page.replace("\u00a0", " ")))
@@ -330,6 +333,8 @@ def test_the_first_page_has_the_look_the_cards_the_limits_and_the_rate_of_false_
         "Noticed?  not significant", "p = .5, n = 12.", "So.", "About the figure", "About late-b.", "late-b True",
         "Age", "Old.", "What this study cannot show", "No key.", "Block b : Few.", "Of 11 people.",
     ]  # fmt: skip
+    liquids_alone = results_of(block("a", n=7), people=("P1",) * 15)
+    assert "Of 7 people." not in pages.first_page(liquids_alone, [])  # the rate is that of studies with delays
     planned = replace(DECIDED, looks=(15, 30), look=1, planned_alpha=0.05)
     looked = list(page_lines(pages.first_page(SimpleNamespace(**{**vars(results), "decided": planned}), [])))
     assert looked[0].startswith("This is look 1 of 2, planned at 15 and 30 participants.")

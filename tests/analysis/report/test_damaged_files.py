@@ -28,7 +28,7 @@ def copy(tmp_path: Path) -> StudyFolder:
     return StudyFolder(folder)
 
 
-def told(folder: StudyFolder) -> list[str]:
+def doubts_of(folder: StudyFolder) -> list[str]:
     return [str(doubt) for doubt in load_study(folder.path).doubts]
 
 
@@ -54,21 +54,21 @@ def another_answer(session: SessionFolder) -> Path:
 
 
 @pytest.mark.slow
-def test_a_table_changed_by_hand_is_named_with_what_mends_it(copy: StudyFolder) -> None:
+def test_a_table_changed_by_hand_is_named_with_the_command_that_repairs_it(copy: StudyFolder) -> None:
     session = copy.sessions()[1]
     path = another_answer(session)
-    (line,) = told(copy)
+    (line,) = doubts_of(copy)
     assert line.startswith(
         f"{path} differs from the journal, starting at line 2; the rebuild command recreates it: run liquid-study"
     )
     rebuild_session(session.path)
-    assert told(copy) == []
+    assert doubts_of(copy) == []
 
 
-def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
+def test_a_changed_journal_is_not_used_for_rebuilding(copy: StudyFolder) -> None:
     session = copy.sessions()[0]
     change(session.journal, b'"operator":"', b'"operator":"X')
-    (line,) = told(copy)
+    (line,) = doubts_of(copy)
     assert line.startswith(f"{session.journal} line ")
     assert "restore the journal from a backup" in line
     assert "rebuild" not in line
@@ -90,9 +90,34 @@ def test_every_damage_behind_the_numbers_is_a_line_of_its_file(
     copy: StudyFolder, harm: Callable[[SessionFolder], object], says: str
 ) -> None:
     harm(copy.sessions()[2])
-    lines = told(copy)
+    lines = doubts_of(copy)
     assert says in "\n".join(lines)
     assert all("liquid-study verify" in line for line in lines)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"{}"])
+def test_a_session_with_a_lost_receipt_is_not_included(
+    copy: StudyFolder, tmp_path: Path, content: bytes | None
+) -> None:
+    lost = copy.sessions()[0]
+    lost.receipt.unlink()
+    if content is not None:
+        lost.receipt.write_bytes(content)
+    study = load_study(copy.path)
+    assert (study.n, study.left_out, study.damaged_sessions) == (2, 0, 1)
+    assert list(study.participants["status"]) == ["completed", "completed", "damaged"]
+    to = tmp_path / "out"
+    finished = CliRunner().invoke(commands, ["report", str(copy.path), "--to", str(to)])
+    what = "is missing or damaged, so the session is not included in the analysis"
+    assert (finished.exit_code, finished.stderr) == (0, f"warning: {lost.receipt} {what}: restore it from a backup\n")
+    summary = json.loads((to / "report.json").read_text(encoding="utf-8"))
+    assert summary["doubts"] == [{"file": lost.receipt.relative_to(copy.path).as_posix(), "what": what}]
+    assert "Three sessions: 2 completed and 1 damaged." in (to / "report.html").read_text(encoding="utf-8")
+    assert "file is used" not in (to / "liquids.txt").read_text(encoding="utf-8")
+    exclude = ["exclude", str(copy.path), "--participant", lost.participant, "--by", "AK", "--reason", "lost"]
+    assert CliRunner().invoke(commands, exclude).exit_code == 0
+    excluded = load_study(copy.path)
+    assert (len(excluded.excluded_sessions), excluded.damaged_sessions) == (1, 0)
 
 
 def test_a_table_without_one_of_its_columns_is_refused(copy: StudyFolder) -> None:
@@ -108,7 +133,7 @@ def test_a_table_without_one_of_its_columns_is_refused(copy: StudyFolder) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["export", "plot"])
-def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
+def test_commands_continue_with_a_warning_in_the_terminal_and_beside_the_output(
     copy: StudyFolder, tmp_path: Path, command: str
 ) -> None:
     path = another_answer(copy.sessions()[0])
@@ -128,15 +153,15 @@ def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
 
 @pytest.mark.slow
 def test_one_file_that_was_changed_brings_all_of_its_session_under_suspicion(copy: StudyFolder) -> None:
-    """The other tables are then compared with the journal, and not only with their checksums."""
+    """The other tables of the session are then also compared with the journal."""
     session = copy.sessions()[0]
     table = another_answer(session)
     name = table.name
-    listed = session.checksums.read_text(encoding="utf-8")
+    checksums_text = session.checksums.read_text(encoding="utf-8")
     forged = hashlib.sha256(table.read_bytes()).hexdigest()
     session.checksums.write_text(
-        re.sub(rf"[0-9a-f]{{64}}  {name}", f"{forged}  {name}", listed), encoding="utf-8", newline="\n"
+        re.sub(rf"[0-9a-f]{{64}}  {name}", f"{forged}  {name}", checksums_text), encoding="utf-8", newline="\n"
     )
     trials = session.table("rek2024", "trials")
     change(trials, b",complete,", b",timeout,")
-    assert {line.split()[0] for line in told(copy)} == {str(trials), str(table)}
+    assert {line.split()[0] for line in doubts_of(copy)} == {str(trials), str(table)}

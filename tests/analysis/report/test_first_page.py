@@ -20,14 +20,14 @@ from study_app.analysis.findings.recognition import LiquidRecognition, Recogniti
 from study_app.analysis.findings.statement_tests import DelayTrend, Effects, Pairs, add_gates
 from study_app.analysis.page_layout import Drawing
 from study_app.analysis.report import first_page as pages
-from study_app.analysis.report import sections
+from study_app.analysis.report import motion_section, sections
 from study_app.analysis.report.first_page import Card, Presented, first_page, presented_in
 from study_app.analysis.report.sections import CLAIMS, answers, false_claims_sentence
 from study_app.analysis.results import GroupAnswers, QuestionResult, Results, lead_phrase
 from study_app.analysis.statistics.recognition_tests import recognition
 from study_app.protocol.trials.designs import default_design
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
-from tests.analysis.report.sentences import Told, check
+from tests.analysis.report.sentences import ReportNumbers, check
 from tests.golden_values import page_lines
 
 pytestmark = pytest.mark.slow
@@ -46,7 +46,7 @@ def of_liquids(answer: Said, people: int = 12, decided: Decided = DECIDED) -> Re
 
 
 def rising_answer(from_code: int) -> Said:
-    """Return answers to one statement that rise, and to the other that fall, by 4 points from a setting (D1 …) on."""
+    """Return answers that rise to one statement and fall to the other by 4 points from a setting (D1 …) on."""
     rng = np.random.default_rng(2)
 
     def answer(_person: int, _session: int, code: str, item: str) -> int:
@@ -81,24 +81,26 @@ def primary_later() -> Results:
     return of_delays(answer, replace(DECIDED, primary=ITEMS[1:]))
 
 
-def changed(results: Results, finding: Any, change: Callable[[int, Any], Any]) -> Results:
+def with_changed_entries(results: Results, finding: Any, change: Callable[[int, Any], Any]) -> Results:
     """Return results in which each entry of a finding is changed, or left out where that gives None."""
     (block,) = results.blocks
-    entries = (change(number, one) for number, one in enumerate(finding.value_in(block)))
-    return replace(results, blocks=(finding.add_to(block, tuple(one for one in entries if one is not None)),))
+    entries = (change(number, entry) for number, entry in enumerate(finding.value_in(block)))
+    return replace(results, blocks=(finding.add_to(block, tuple(entry for entry in entries if entry is not None)),))
 
 
-def judged(verdict: str) -> Callable[[int, Any], Any]:
-    return lambda number, one: one if number else replace(one, tested=replace(one.tested, verdict=verdict))
+def with_verdict(verdict: str) -> Callable[[int, Any], Any]:
+    return lambda number, entry: entry if number else replace(entry, tested=replace(entry.tested, verdict=verdict))
 
 
 def threshold_alone(**decided: Any) -> Results:
-    results = changed(changed(rising(3), LowestDelay, lambda *_: None), ContrastsWithControl, lambda *_: None)
+    results = with_changed_entries(
+        with_changed_entries(rising(3), LowestDelay, lambda *_: None), ContrastsWithControl, lambda *_: None
+    )
     return replace(results, decided=replace(results.decided, **decided))
 
 
-def without_harder(_number: int, one: Any) -> Any:
-    return None if one.item == "harder" else one
+def without_harder(_number: int, entry: Any) -> Any:
+    return None if entry.item == "harder" else entry
 
 
 def studies() -> Iterator[tuple[str, Results]]:
@@ -113,11 +115,11 @@ def studies() -> Iterator[tuple[str, Results]]:
     yield "shown", ordered(5)
     yield "suggested", ordered(5, primary=ITEMS[:1])
     yield "shown", ordered(7)
-    yield "shown", changed(ordered(7), Pairs, lambda _, one: judged("not shown")(0, one))
-    yield "shown", changed(ordered(8), Pairs, judged("suggested"))
+    yield "shown", with_changed_entries(ordered(7), Pairs, lambda _, entry: with_verdict("not shown")(0, entry))
+    yield "shown", with_changed_entries(ordered(8), Pairs, with_verdict("suggested"))
     yield "shown, inconclusive", primary_later()
-    exploratory = changed(primary_later(), LowestDelay, without_harder)
-    yield "suggested, inconclusive", changed(exploratory, ContrastsWithControl, without_harder)
+    exploratory = with_changed_entries(primary_later(), LowestDelay, without_harder)
+    yield "suggested, inconclusive", with_changed_entries(exploratory, ContrastsWithControl, without_harder)
     yield "shown, not tested", threshold_alone()
     yield "suggested, not tested", threshold_alone(changed=True)
     yield "suggested, not tested", threshold_alone(primary=ITEMS[1:])
@@ -128,11 +130,11 @@ def studies() -> Iterator[tuple[str, Results]]:
 def test_a_single_liquid_is_a_limit_only_of_statements_that_are_planned_to_differ(
     primary: tuple[str, ...], said: list[str]
 ) -> None:
-    made = study(liquids(1), list(everybody(liquids(1), 12, lambda *_: 4)), replace(DECIDED, primary=primary))
-    assert [line for line in sections.limits(made, evaluate(made)) if "one liquid" in line] == said
+    case_study = study(liquids(1), list(everybody(liquids(1), 12, lambda *_: 4)), replace(DECIDED, primary=primary))
+    assert [line for line in sections.limits(case_study, evaluate(case_study)) if "one liquid" in line] == said
 
 
-def test_the_page_says_what_each_block_presented() -> None:
+def test_the_first_page_names_the_conditions_of_each_block() -> None:
     def presented(*conditions: tuple[str, float | None], link: str = "") -> Setting:
         (liquid, delay_ms), *_ = conditions
         return Setting(code="L1", condition="c", liquid=liquid, delay_ms=delay_ms, link=link)
@@ -156,7 +158,7 @@ def test_the_page_says_what_each_block_presented() -> None:
         [(who, block) for who, of in enumerate(had) for block in of], columns=["participant", "block"]
     )
     trials["counted"] = trials.index < len(trials) - 1
-    study: Any = SimpleNamespace(blocks=(), levels=blocks, trials=trials)
+    study: Any = SimpleNamespace(trial_blocks=(), levels=blocks, trials=trials)
     assert {block: presented.sentence for block, presented in presented_in(study).items()} == {
         "late": (
             "In the block “Liquids late” (ABX, 3 trials per participant), the liquids were “slime” and “gear oil”, "
@@ -190,7 +192,7 @@ _OF_DELAYS = (("“oil”", "60 ms of visual delay", ""), ("“oil”", "no visu
         (("Sealed", "Late"), ((), _OF_DELAYS[0]), ["", ""]),
     ],
 )
-def test_a_comparison_says_what_sets_its_sides_apart_unless_their_names_do(
+def test_a_comparison_states_the_difference_of_its_sides_unless_their_names_do(
     names: tuple[str, str], presented: tuple[tuple[str, ...], ...], added: list[str]
 ) -> None:
     assert pages._distinguish_names(names, presented) == added
@@ -208,7 +210,7 @@ def test_a_comparison_says_what_sets_its_sides_apart_unless_their_names_do(
         ("pse", (None, None), " Values are Weber fractions."),
     ],
 )
-def test_what_weber_fractions_mean_is_said_of_thresholds_and_their_criterion_if_it_is_one(
+def test_the_explanation_of_weber_fractions_states_a_single_criterion(
     measure: str, rates: tuple[float | None, ...], said: str
 ) -> None:
     levels = [
@@ -217,7 +219,7 @@ def test_what_weber_fractions_mean_is_said_of_thresholds_and_their_criterion_if_
     ]
     contrast: Any = SimpleNamespace(contrast=SimpleNamespace(blocks=("a", "b"), measure=measure), scale=None)
     results: Any = SimpleNamespace(levels=levels)
-    assert pages._scale_words(contrast, results) == said
+    assert pages._scale_text(contrast, results) == said
 
 
 _ASKED_AFTER = {"a": {"P1": 40.0, "P2": 50.0}, "b": {"P1": 20.0, "P2": 40.0}, "c": {"P1": 10.0, "P2": 20.0}}
@@ -225,18 +227,20 @@ _ASKED_AFTER = {"a": {"P1": 40.0, "P2": 50.0}, "b": {"P1": 20.0, "P2": 40.0}, "c
 
 @pytest.mark.parametrize(("blocks", "people", "n"), [("ab", 2, 0), ("abc", 2, 1), ("ab", 1, 1)])
 def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, people: int, n: int) -> None:
-    held = [dict(list(_ASKED_AFTER[block].items())[:people]) for block in "ab"]
+    answers_of_blocks = [dict(list(_ASKED_AFTER[block].items())[:people]) for block in "ab"]
     of_form = SimpleNamespace(form="load", measure="raw", blocks=("a", "b"), conditions=None)
-    tested = SimpleNamespace(contrast=of_form, left_out={}, sides=[SimpleNamespace(values=values) for values in held])
-    asked = SimpleNamespace(where="load", title="Load", is_form=True, item="i", n=2, measure="quartiles", groups=())
-    results: Any = SimpleNamespace(questions=[asked], levels=[], blocks=[], scores=[asked], contrasts=[tested])
+    tested = SimpleNamespace(
+        contrast=of_form, left_out={}, sides=[SimpleNamespace(values=values) for values in answers_of_blocks]
+    )
+    question = SimpleNamespace(where="load", title="Load", is_form=True, item="i", n=2, measure="quartiles", groups=())
+    results: Any = SimpleNamespace(questions=[question], levels=[], blocks=[], scores=[question], contrasts=[tested])
     by_setting = tuple((f"After {block}", _ASKED_AFTER[block]) for block in blocks)
     raw = Numbers("raw", (0.0, 100.0), True, by_setting, "raw", tuple(blocks), tuple(blocks))
     presented = {block: Presented("", {"": of}) for block, of in zip("ab", _OF_DELAYS, strict=True)}
-    made = list(pages._question_cards(results, {"load": [raw]}, presented))
-    assert len(made) == n
-    if blocks == "ab" and made:
-        assert "after a (60 ms of visual delay) and 30.0 [" in made[0].sentences[0]
+    question_cards = list(pages._question_cards(results, {"load": [raw]}, presented))
+    assert len(question_cards) == n
+    if blocks == "ab" and question_cards:
+        assert "after a (60 ms of visual delay) and 30.0 [" in question_cards[0].sentences[0]
 
 
 @pytest.mark.parametrize(
@@ -283,11 +287,9 @@ def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, p
         ),
     ],
 )  # fmt: skip
-def test_numbers_are_told_with_the_mean_of_each_setting_and_the_mean_difference_of_two(
-    numbers: Numbers, words: str
-) -> None:
+def test_an_answer_states_the_mean_of_each_setting_and_the_mean_difference_of_two(numbers: Numbers, words: str) -> None:
     """Student's t(1) is 12.706 and t(2) 4.303; the standard errors are 2 or 1, and 2 / √3."""
-    assert pages._number_words(numbers) == words
+    assert pages._number_text(numbers) == words
 
 
 @pytest.mark.parametrize(
@@ -321,22 +323,22 @@ def test_all_limits_are_shown_by_subject() -> None:
 def test_each_answer_has_its_verdict_and_is_true_of_its_numbers() -> None:
     for verdicts, results in studies():
         without_answers: Any = None  # these sentences follow from the results
-        given = answers(results)
-        assert ", ".join(one.verdict for one in given) == verdicts
-        for one in given:
-            assert one.claims == (one.verdict in {"shown", "suggested"})
-            check(one.text, Told(without_answers, results))
+        all_answers = answers(results)
+        assert ", ".join(answer.verdict for answer in all_answers) == verdicts
+        for answer in all_answers:
+            assert answer.claims == (answer.verdict in {"shown", "suggested"})
+            check(answer.text, ReportNumbers(without_answers, results))
 
 
-def test_who_may_differ_more_is_told_of_the_delays_up_to_the_stated_one() -> None:
-    """Of twenty, no one differs up to 100 ms: the exact upper limit is 1 − 0.025 ** (1 / 20) = 16.8 %."""
+def test_the_limit_on_a_differing_minority_covers_the_delays_up_to_the_stated_one() -> None:
+    """None of twenty differs up to 100 ms: the exact upper limit is 1 − 0.025 ** (1 / 20) = 16.8 %."""
     results = of_delays(lambda person, _session, code, _item: 3 + person % 2 + 3 * (code == "D4"))
-    (text,) = [one.text for one in answers(results) if one.text.startswith("Up to ")]
+    (text,) = [answer.text for answer in answers(results) if answer.text.startswith("Up to ")]
     assert text.startswith("Up to 100 ms, ")
     assert "up to 17 % of people show" in text
 
 
-def test_lowest_delays_are_told_by_statement_and_the_shortest_in_the_figure_of_the_threshold() -> None:
+def test_lowest_delays_are_stated_per_statement_and_the_shortest_in_the_threshold_figure() -> None:
     def with_surer_steps(number: int, lowest: LowestTrend) -> LowestTrend:
         """Return the first two steps of one statement, and the first of the other, with a p that six digits keep."""
         steps = [
@@ -345,8 +347,8 @@ def test_lowest_delays_are_told_by_statement_and_the_shortest_in_the_figure_of_t
         ]
         return replace(lowest, members=10**6, steps=replace(lowest.steps, steps=tuple(steps)))
 
-    made = study(delays(DELAYS), list(everybody(delays(DELAYS), 20, rising_answer(2))))
-    results = changed(evaluate(made), LowestDelay, with_surer_steps)
+    case_study = study(delays(DELAYS), list(everybody(delays(DELAYS), 20, rising_answer(2))))
+    results = with_changed_entries(evaluate(case_study), LowestDelay, with_surer_steps)
     (block,) = results.blocks
     lines = list(page_lines("".join(LowestDelay(block, results).section())))
     at = next(at for at, line in enumerate(lines) if line.startswith("Statement | shortest | uncorrected | "))
@@ -354,17 +356,21 @@ def test_lowest_delays_are_told_by_statement_and_the_shortest_in_the_figure_of_t
         ["Different", "≤ 100 ms", "≤ 50 ms"],
         ["Harder", "≤ 150 ms", "≤ 50 ms"],
     ]
-    picture = DetectionThreshold(block, results).figure(Drawing(made, made.blocks[0], block, results, "threshold", ()))
+    picture = DetectionThreshold(block, results).figure(
+        Drawing(case_study, case_study.blocks[0], block, results, "threshold", ())
+    )
     assert picture is not None
     assert picture.caption.endswith("the shortest delay at which any statement shows a trend, 100 ms.")
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.02])
 def test_the_figure_of_differences_has_the_intervals_of_the_equivalence_tests(alpha: float) -> None:
-    made = study(delays(DELAYS), list(everybody(delays(DELAYS), 20, rising_answer(3))), replace(DECIDED, alpha=alpha))
-    results = evaluate(made)
+    case_study = study(
+        delays(DELAYS), list(everybody(delays(DELAYS), 20, rising_answer(3))), replace(DECIDED, alpha=alpha)
+    )
+    results = evaluate(case_study)
     (block,) = results.blocks
-    picture = Effects(block, results).figure(Drawing(made, made.blocks[0], block, results, "effects", ()))
+    picture = Effects(block, results).figure(Drawing(case_study, case_study.blocks[0], block, results, "effects", ()))
     assert picture is not None
     rows = {line.split("\t")[0]: line.split("\t")[1:] for line in picture.numbers.splitlines()}
     level = f"{100 - 200 * alpha:.0f} %"
@@ -391,7 +397,7 @@ def test_the_measured_rate_is_that_of_the_nearest_size_with_wilsons_interval(par
 
 
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
-    """One statement rises a little: alone it is significant; the others, which scatter, hide it."""
+    """A small rise of one statement is significant by itself but not over all, because the others scatter."""
     rng = np.random.default_rng(4)
     items = tuple(Item(id=name, text=name, short=name) for name in (*ITEMS, *"abcdefgh"))
     block = Block(
@@ -406,14 +412,18 @@ def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() 
     single = {item.id: rng.integers(1, 8, (14, 4, 1)).astype(float) for item in items}
     single[ITEMS[0]] = np.clip(np.arange(1, 5)[:, None] + rng.integers(0, 3, (14, 4, 1)), 1, 7).astype(float)
     decided = replace(DECIDED, primary=ITEMS[:1])
-    asked = answers_from_tables(block, decided, tuple(map(str, range(14))), single)
-    (one,) = add_gates([asked])
-    two = add_gates([replace(asked, values={ITEMS[1]: asked.values[ITEMS[1]]}), asked])[1]
-    assert one.over_all is not None
-    assert one.gate == one.over_all.p
-    assert two.gate > one.gate  # Holm, over both blocks
+    block_result = answers_from_tables(block, decided, tuple(map(str, range(14))), single)
+    (gated,) = add_gates([block_result])
+    two = add_gates([replace(block_result, values={ITEMS[1]: block_result.values[ITEMS[1]]}), block_result])[1]
+    assert gated.over_all is not None
+    assert gated.gate == gated.over_all.p
+    assert two.gate > gated.gate  # Holm, over both blocks
     for gate, verdict in ((0.05, "shown"), (0.051, "not shown")):
-        (tested,) = (one for one in DelayTrend.value_in(evaluate_block(None, replace(asked, gate=gate))) if one.primary)
+        (tested,) = (
+            trend
+            for trend in DelayTrend.value_in(evaluate_block(None, replace(block_result, gate=gate)))
+            if trend.primary
+        )
         assert (tested.verdict, tested.p_adjusted) == (verdict, gate)
 
 
@@ -432,22 +442,22 @@ def recognition_of(names: np.ndarray) -> RecognitionResult:
 def test_a_liquid_is_recognised_where_its_name_is_used_more_often_than_for_each_other() -> None:
     # Honey is known by all; water and oil are answered alike by 8, and told from each other by 4 of 12.
     names = np.column_stack([[0] * 8 + [0] * 4, [1] * 12, [0] * 8 + [2] * 4])
-    named = recognition_of(names)
-    water, honey, oil = named.found.rates
+    recognition = recognition_of(names)
+    water, honey, oil = recognition.found.rates
     assert (water.rival, water.p) == (2, 2**-4)  # four used it for water and not for oil, nobody the other way round
     assert (honey.p, honey.p_adjusted) == (pytest.approx(2**-12), pytest.approx(3 * 2**-12))
     assert oil.p == 2**-4
     assert water.p_adjusted == oil.p_adjusted == 2 * 2**-4
-    assert recognised(named, 0.05) == (1,)
-    assert recognised(named, 0.13) == (0, 1, 2)
-    assert recognised(replace(named, verdict="suggested"), 0.05) == (1,)
-    assert recognised(replace(named, verdict="not shown"), 0.05) == ()
+    assert recognised(recognition, 0.05) == (1,)
+    assert recognised(recognition, 0.13) == (0, 1, 2)
+    assert recognised(replace(recognition, verdict="suggested"), 0.05) == (1,)
+    assert recognised(replace(recognition, verdict="not shown"), 0.05) == ()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [12, 24, 60])
 @pytest.mark.parametrize("bias", [0.5, 0.8])
-def test_liquids_that_are_confused_are_seldom_called_recognised(n: int, bias: float) -> None:
+def test_confused_liquids_are_rarely_called_recognised(n: int, bias: float) -> None:
     """All know honey; water and oil are called water by so many, whichever they are."""
     rng, studies, false = np.random.default_rng(n), 300, 0
     for _ in range(studies):
@@ -465,38 +475,38 @@ def test_known_liquids_are_called_recognised(n: int) -> None:
         recognised(recognition_of(np.where(rng.random((n, 3)) < 0.8, [0, 1, 2], rng.integers(0, 3, (n, 3)))), 0.05)
         for _ in range(100)
     ]
-    assert sum(one == (0, 1, 2) for one in known) >= (75 if n == 12 else 99)
+    assert sum(labels == (0, 1, 2) for labels in known) >= (75 if n == 12 else 99)
 
 
 @pytest.mark.parametrize(
     ("reaching", "recorded", "said"),
     [((), "", 0), (("reach",), "", 1), (("reach",), "reach", 2), (("reach",), "other", 1)],
 )
-def test_a_block_without_reaching_measures_says_why(
+def test_a_block_without_reaching_measures_states_the_reason(
     reaching: tuple[str, ...], recorded: str, said: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sentences = "This block does not contain a reaching task", "Without readable recordings of this block"
     measured = SimpleNamespace(reaching=(*reaching, "other"), recorded_in=lambda block: block == recorded)
-    blocks = [SimpleNamespace(id=name, title=name) for name in ("reach", "other")]
-    results: Any = SimpleNamespace(blocks=blocks, performance=measured, delivered=())
-    made = {
+    blocks = [SimpleNamespace(id=name, title=name, settings=("L1", "L2")) for name in ("reach", "other")]
+    results: Any = SimpleNamespace(trial_blocks=blocks, performance=measured, delivered=())
+    sections_of_block = {
         "_movement_measures": [],
         "_motion_rows": [["thin", "1", "2"]],
         "_recordings_sentence": "",
         "settings_noun": "setting",
     }
-    for name, value in made.items():
-        monkeypatch.setattr(sections, name, lambda *_, value=value, **__: value)
-    page = "".join(sections.motion(results))
+    for name, value in sections_of_block.items():
+        monkeypatch.setattr(motion_section, name, lambda *_, value=value, **__: value)
+    page = "".join(motion_section.motion_section(results))
     of_block = page.partition(">other<")[0]
     assert [sentence in of_block for sentence in sentences] == [said == 0, said == 1]
     assert ("overshoot, mm: " in page) is bool(recorded), "of any block"
 
 
-def test_of_successive_short_cards_each_pair_is_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_successive_short_cards_are_placed_side_by_side_in_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     """A short card without a neighbour would leave half of the page empty."""
     kinds = "S SS L SSS L S L S TT T".replace(" ", "")  # figures of T have two rows of panels
-    made = [
+    cards = [
         Card(
             question=f"{place}",
             verdict="",
@@ -507,32 +517,48 @@ def test_of_successive_short_cards_each_pair_is_side_by_side(monkeypatch: pytest
         )
         for place, kind in enumerate(kinds)
     ]
-    monkeypatch.setattr(pages, "cards", lambda *_: made)
+    monkeypatch.setattr(pages, "cards", lambda *_: cards)
     page = first_page(rising(5), ())
     assert ["S" if small else "-" for small in re.findall(r'<article class="card( small)?">', page)] == list(
         "SS--SS-----SS-"
     )
-    assert page.count("n\u00a0=\u00a012") == len(made)
+    assert page.count("n\u00a0=\u00a012") == len(cards)
 
 
 @pytest.mark.parametrize(
-    ("counts", "sentence"),
+    ("counts", "sentence", "repeated_sentence"),
     [
-        ({"tea": 2, "milk": 5, "rum": 0}, "5 of 8 participants chose “milk” (62 %"),
-        ({"tea": 3, "milk": 1, "rum": 3}, "3 of 8 participants chose “tea”, and as many chose “rum” (38 %"),
-        ({"tea": 2, "milk": 2, "rum": 2}, "2 of 8 participants chose “tea”, and as many chose “milk” and “rum” (25 %"),
+        (
+            {"tea": 2, "milk": 5, "rum": 0},
+            "5 of 8 participants chose “milk” (62 %",
+            "5 of 8 answers by 5 participants were “milk” (62 %)",
+        ),
+        (
+            {"tea": 3, "milk": 1, "rum": 3},
+            "3 of 8 participants chose “tea”, and as many chose “rum” (38 %",
+            "“tea” and “rum” were each chosen in 3 of 8 answers by 5 participants (38 %)",
+        ),
+        (
+            {"tea": 2, "milk": 2, "rum": 2},
+            "2 of 8 participants chose “tea”, and as many chose “milk” and “rum” (25 %",
+            "“tea”, “milk” and “rum” were each chosen in 2 of 8 answers by 5 participants (25 %)",
+        ),
     ],
 )
-def test_a_choice_names_each_of_the_most_frequent_options(counts: dict[str, int], sentence: str) -> None:
+def test_a_choice_names_each_of_the_most_frequent_options(
+    counts: dict[str, int], sentence: str, repeated_sentence: str
+) -> None:
     answered = GroupAnswers(code=None, name="", numbers={"n": 8, "participants": 8, "counts": counts})
     result = QuestionResult(
         where="form", title="Form", is_form=True, item="drink", text="Which drink?", short="Drink", kind="choice",
         measure="counts", figure=None, groups=(answered,),
     )  # fmt: skip
-    assert pages._choice_words(result).startswith(f"“Drink”: {sentence}, 95 % confidence interval [")
-    named = replace(result, options={"milk": "Warm milk", "tea": "Green tea", "rum": "Rum"})
+    assert pages._choice_text(result).startswith(f"“Drink”: {sentence}, 95 % confidence interval [")
+    with_options = replace(result, options={"milk": "Warm milk", "tea": "Green tea", "rum": "Rum"})
     with_text = sentence.replace("“milk”", "“Warm milk”").replace("“tea”", "“Green tea”").replace("“rum”", "“Rum”")
-    assert pages._choice_words(named).startswith(f"“Drink”: {with_text}, ")
+    assert pages._choice_text(with_options).startswith(f"“Drink”: {with_text}, ")
     repeated = replace(answered, numbers={**answered.numbers, "participants": 5})
-    given = sentence.replace("participants chose", "answers by 5 participants were").replace("many chose", "many")
-    assert pages._choice_words(replace(result, groups=(repeated,))) == f"“Drink”: {given})."
+    assert pages._choice_text(replace(result, groups=(repeated,))) == f"“Drink”: {repeated_sentence}."
+    about_wax = tuple(replace(repeated, name=name) for name in ("Wax", "Oil"))
+    text = pages._choice_text(replace(result, groups=about_wax))
+    assert text == f"“Drink”: for wax, {repeated_sentence}; for oil, {repeated_sentence}."

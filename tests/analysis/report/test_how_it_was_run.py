@@ -14,8 +14,10 @@ import pytest
 
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.summary_figures import Numbers
-from study_app.analysis.report import first_page, methods, sections
+from study_app.analysis.report import first_page, methods, practice_and_breaks, sections
+from study_app.analysis.report.motion_section import motion_section
 from study_app.analysis.results import BlockResult, Delivered, GroupAnswers, LevelsResult, QuestionResult
+from study_app.protocol.questions import ShowIf
 from study_app.store.exclusions import Exclusion
 from study_app.store.session_progress.missing_trials import MISSING_PERCENT
 from study_app.store.withdrawals import Tombstone
@@ -47,7 +49,7 @@ def result_of(of: Study) -> BlockResult:
 
 def results(of: Study, **values: Any) -> Any:
     """Return results with one block."""
-    held = {
+    fields = {
         "blocks": [result_of(of)],
         "contrasts": (),
         "questions": (),
@@ -55,8 +57,10 @@ def results(of: Study, **values: Any) -> Any:
         "delivered": (),
         "orders": {},
         "scores": (),
-    }
-    return SimpleNamespace(decided=of.decided, **(held | values))
+        "block_orders": None,
+        "unrated_blocks": (),
+    } | values
+    return SimpleNamespace(decided=of.decided, trial_blocks=fields["blocks"], **fields)
 
 
 def text_of(parts: Iterable[Any]) -> str:
@@ -69,30 +73,30 @@ def conduct() -> Iterator[str]:
         participant=["A-P1", "A-P2", "B-P1"], status=["completed", "aborted", "completed"],
         counted=[True, False, True], excluded=[False, False, False], motors_masked=["no", "with noise", "no"],
     )  # fmt: skip
-    gone = Tombstone(participant="A-P9", at="2026-02-03T10:00:00", by="BL", reason="asked", sessions=())
+    withdrawal = Tombstone(participant="A-P9", at="2026-02-03T10:00:00", by="BL", reason="asked", sessions=())
     out = exclusion("B-P1", 7), exclusion("A-P1")
     changed: Any = SimpleNamespace(path=Path("nowhere/data/x.csv"), what="differs")
-    shown = replace(
+    case_study = replace(
         LIQUIDS,
         participants=people,
         sites=("A", "B"),
-        withdrawn=(gone,),
+        withdrawn=(withdrawal,),
         exclusions=out,
         late=out[1:],
         doubts=(changed,),
     )
-    yield text_of(sections.conduct(shown, results(shown, blocks=())))
-    yield methods.late_exclusions(shown)
-    yield methods.late_exclusions(replace(shown, exclusions=out[:1]))
-    yield methods._exclusion_sentences(shown)
-    yield methods._exclusion_sentences(replace(LIQUIDS, exclusions=out))
+    yield text_of(sections.conduct(case_study, results(case_study, blocks=())))
+    yield methods.late_exclusions(case_study)
+    yield methods.late_exclusions(replace(case_study, exclusions=out[:1]))
+    yield methods._exclusion_sentences(case_study)
+    yield methods._exclusion_sentences(replace(LIQUIDS, exclusions=(exclusion("P001", 7), *out)))
     yield methods._exclusion_sentences(replace(LIQUIDS, exclusions=(exclusion("P1", by="fast_answers"),), settings={}))
     yield from (" ".join(sections._first_lines([*map(str, range(count))])) for count in (20, 23))
 
 
 def delivered() -> Iterator[str]:
     limits = {"delay_error_p95_ms": 4.0, "withheld_percent": 2.5}
-    shown = replace(DELAYS, protocol={**DELAYS.protocol, "limits": limits})
+    case_study = replace(DELAYS, protocol={**DELAYS.protocol, "limits": limits})
     fields = (
         "block", "code", "delay_ms", "trials", "measured", "judged", "valid", "error_mean_ms", "error_worst_ms",
         "achieved_ms",
@@ -101,17 +105,19 @@ def delivered() -> Iterator[str]:
         ("b", "D1", 50.0, 9, 8, 7, 6, 1.24, -3.5, 53.06), ("b", "D2", 10.5, 5, 5, 0, 0, None, None, None),
         ("b", None, None, 14, 13, 7, 5, -0.5, 2.26, None), ("b", "D2", 0.0, 5, 5, 5, 4, 0.5, 1.0, 2.0),
     ]  # fmt: skip
-    found = results(shown, delivered=[Delivered(**dict(zip(fields, row, strict=True))) for row in rows])
-    yield text_of(sections._delivered_delays_part(shown, found))
-    yield text_of(sections._delivered_delays_part(replace(shown, settings={}), found)).rpartition("Trials that exceed")[
-        2
-    ]
-    yield text_of(sections._delivered_delays_part(replace(shown, settings={}), found)).partition("Delay error is")[0]
+    study_results = results(case_study, delivered=[Delivered(**dict(zip(fields, row, strict=True))) for row in rows])
+    yield text_of(sections._delivered_delays_part(case_study, study_results))
+    yield text_of(sections._delivered_delays_part(replace(case_study, settings={}), study_results)).rpartition(
+        "Trials that exceed"
+    )[2]
+    yield text_of(sections._delivered_delays_part(replace(case_study, settings={}), study_results)).partition(
+        "Delay error is"
+    )[0]
     yield "; ".join(sections._limit_text(what, 7.0) for what in ("frame_gap_ms", "hz", "withheld_percent"))
     yield "; ".join(sections._signed_ms(value) for value in (None, 0.0, 1.5, -1.5))
-    yield from methods._delay_sentences(shown, found)
-    found.delivered = [replace(one, achieved_ms=None) for one in found.delivered]
-    yield from methods._delay_sentences(shown, found)
+    yield from methods._delay_sentences(case_study, study_results)
+    study_results.delivered = [replace(delivery, achieved_ms=None) for delivery in study_results.delivered]
+    yield from methods._delay_sentences(case_study, study_results)
 
 
 def lost_trials() -> Iterator[str]:
@@ -121,7 +127,7 @@ def lost_trials() -> Iterator[str]:
     some = replace(DELAYS, levels=levels, participants=people, protocol={"limits": {MISSING_PERCENT: 12.5}})
     measured = pd.DataFrame({"counted": [True], "valid": [True]})
     none = replace(some, participants=people[1:], protocol={}, intervals=measured)
-    yield from (text_of(sections._missing_trials_part(one)) for one in (some, none, replace(none, levels=())))
+    yield from (text_of(sections._missing_trials_part(blocks)) for blocks in (some, none, replace(none, levels=())))
     yield methods._missing_trials_sentence(none)
 
 
@@ -131,14 +137,14 @@ def groups() -> Iterator[str]:
         name: getattr(LIQUIDS, name).assign(participant=getattr(LIQUIDS, name)["participant"].map(ids))
         for name in ("participants", "responses", "trials")
     }
-    shown = replace(LIQUIDS, sites=("A", "B"), **renamed)
-    values = shown.responses["participant"].map({"B-P000": 1, "B-P001": 3, "A-P002": 6}).astype("Int64")
-    people = shown.participants.assign(group=pd.array(["zoo", "zoo", "art"], "string"))
-    shown = replace(shown, participants=people, responses=shown.responses.assign(response=values))
+    case_study = replace(LIQUIDS, sites=("A", "B"), **renamed)
+    values = case_study.responses["participant"].map({"B-P000": 1, "B-P001": 3, "A-P002": 6}).astype("Int64")
+    people = case_study.participants.assign(group=pd.array(["zoo", "zoo", "art"], "string"))
+    case_study = replace(case_study, participants=people, responses=case_study.responses.assign(response=values))
     by: Any
     for by, group in (("group", "randomised"), ("group", "pre-existing"), ("site", "pre-existing")):
-        of = {**shown.protocol, "groups": {"zoo": {}}, "study": {"group_assignment": group}}
-        yield text_of(sections.groups(replace(shown, protocol=of), results(shown), by))
+        of = {**case_study.protocol, "groups": {"zoo": {}}, "study": {"group_assignment": group}}
+        yield text_of(sections.groups(replace(case_study, protocol=of), results(case_study), by))
     yield text_of(sections.groups(LIQUIDS, results(LIQUIDS)))
 
 
@@ -174,20 +180,20 @@ def methods_of_a_study() -> Iterator[str]:
 
 
 def planned() -> Iterator[str]:
-    kept, out = SimpleNamespace(name="kept"), SimpleNamespace(name="out")
-    told = {
+    included, out = SimpleNamespace(name="kept"), SimpleNamespace(name="out")
+    listed_tests = {
         "kept": [("Liquids", "Same?", "shown", "yes")],
         "out": [("Liquids", "Same?", "open", "no"), ("Delays", "When?", "shown", "50")],
     }
     row = SimpleNamespace(
         participant="P7", session=3, rule="fast_answers", why="too fast", decision="excluded", by="AK"
     )
-    rules: Any = SimpleNamespace(proposals=(row,), included=kept, left_out=out)
+    rules: Any = SimpleNamespace(proposals=(row,), included=included, left_out=out)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sections, "conclusions", lambda results: told[results.name])
+        patch.setattr(sections, "conclusions", lambda results: listed_tests[results.name])
         patch.setattr(sections, "level_sentences", lambda results: (f"Track: {results.name}",))
         yield text_of(sections.planned_section(rules))
-        rules.left_out = kept
+        rules.left_out = included
         yield text_of(sections.planned_section(rules)).rpartition("AK ")[2]
         yield text_of(sections.planned_section(rules, sealed=True)).rpartition("AK ")[2]
     yield f"{[*sections.planned_section(None)]}"
@@ -195,14 +201,14 @@ def planned() -> Iterator[str]:
 
 def motion() -> Iterator[str]:
     measures = ("L1", "duration_s", 3), ("L1", "path_mm", 2), ("L3", "path_mm", 4), ("L2", "path_mm", 0)
-    moved = [
+    motion_rows = [
         SimpleNamespace(block="b", code=code, measure=what, n=n, median=at + 0.26, q1=at - 1.5, q3=at + 2.0)
         for at, (code, what, n) in enumerate(measures, start=7)
     ]
     elsewhere = SimpleNamespace(block="c", code="L1", measure="path_mm", n=9, median=99.0, q1=98.0, q3=100.0)
-    moved = [elsewhere, *moved, elsewhere]
+    motion_rows = [elsewhere, *motion_rows, elsewhere]
     measured: Any = SimpleNamespace(
-        moved=moved, reaching=("b",), recorded_in=lambda _block: True, trials=9, recorded=8, unread=(), judged=0,
+        moved=motion_rows, reaching=("b",), recorded_in=lambda _block: True, trials=9, recorded=8, unread=(), judged=0,
         invalid=0,
     )  # fmt: skip
     rows = [
@@ -210,13 +216,13 @@ def motion() -> Iterator[str]:
         for block, at in zip("bbbc", (1, 2, 3, 1), strict=True)
     ]
     rows[-1].valid = 8
-    found = results(LIQUIDS, performance=measured, delivered=rows)
-    yield text_of(sections.motion(found)).partition("duration, s: from")[0]
-    found.performance = None
-    yield text_of(sections.motion(found))
+    study_results = results(LIQUIDS, performance=measured, delivered=rows)
+    yield text_of(motion_section(study_results)).partition("duration, s: from")[0]
+    study_results.performance = None
+    yield text_of(motion_section(study_results))
 
 
-def limits() -> Iterator[str]:
+def limitation_lines() -> Iterator[str]:
     cases: list[dict[str, Any]] = [
         {}, {"settings": {}}, {"settings": {}, "protocol": {"study": {"codes": "participant"}}},
         {"settings": {}, "sites": ("A",)}, {"simulated": True}, {"pilot": True}, {"made": False}, {"changed": True},
@@ -224,18 +230,22 @@ def limits() -> Iterator[str]:
     ]  # fmt: skip
     for case in cases:
         changes = dict(case)
-        shown = study(liquids(2), list(everybody(liquids(2), changes.pop("people", 12), lambda *_: 4)))
-        decided = replace(shown.decided, **{name: changes.pop(name) for name in ("made", "changed") if name in changes})
+        case_study = study(liquids(2), list(everybody(liquids(2), changes.pop("people", 12), lambda *_: 4)))
+        decided = replace(
+            case_study.decided, **{name: changes.pop(name) for name in ("made", "changed") if name in changes}
+        )
         flags = {name: changes.pop(name, False) for name in ("simulated", "pilot")}
-        shown = replace(shown, participants=shown.participants.assign(**flags, protocol_hash="h"), **changes)
+        case_study = replace(
+            case_study, participants=case_study.participants.assign(**flags, protocol_hash="h"), **changes
+        )
         yield f"-- {case}"
-        yield from (line[:90] for line in sections._general_sentences(shown, replace_decided(shown, decided)))
+        yield from (line[:90] for line in sections._general_sentences(case_study, replace_decided(case_study, decided)))
 
 
 def replace_decided(shown: Study, decided: Any) -> Any:
-    found = results(shown)
-    found.decided = decided
-    return found
+    study_results = results(shown)
+    study_results.decided = decided
+    return study_results
 
 
 def first_page_of_questions() -> Iterator[str]:
@@ -245,7 +255,7 @@ def first_page_of_questions() -> Iterator[str]:
         GroupAnswers(code, name, {"n": n, "participants": n, "counts": {"left": n - 2, "right": 2}})
         for code, name, n in (("L1", "Water", 9), ("L2", "Honey", 7), ("L3", "Oil", 0))
     ]
-    asked = [
+    question_results = [
         QuestionResult(
             where=where, title=title, is_form=is_form, item=item, text="Which hand?", short=f"Hand {item}",
             kind="choice", measure=measure, figure=None, groups=tuple(groups[:count]),
@@ -255,26 +265,26 @@ def first_page_of_questions() -> Iterator[str]:
             ("end", "Goodbye", True, "i3", "quartiles", 1),
         )
     ]  # fmt: skip
-    held = {"P1": 2.0, "P2": 5.0, "P3": 3.5}
+    fields = {"P1": 2.0, "P2": 5.0, "P3": 3.5}
     numbers = {
         "b": (
-            Numbers("Warm", (1.0, 7.0), False, (("Water", held), ("Honey", {"P1": 1.0, "P2": 3.0, "P3": 1.0}))),
-            Numbers("SUS", None, True, (("", held),)),
+            Numbers("Warm", (1.0, 7.0), False, (("Water", fields), ("Honey", {"P1": 1.0, "P2": 3.0, "P3": 1.0}))),
+            Numbers("SUS", None, True, (("", fields),)),
         ),
         "end": (Numbers("Age", None, False, (("", {"P1": 20.0, "P2": 31.0}),)),),
     }
-    found = results(LIQUIDS, questions=asked, blocks=[])
-    yield from map(str, first_page.cards(found, numbers))
+    study_results = results(LIQUIDS, questions=question_results, blocks=[])
+    yield from map(str, first_page.cards(study_results, numbers))
     levels = [
         SimpleNamespace(block=block, revealed=revealed, vary=vary)
         for block, revealed, vary in (("end", True, None), ("c", False, None), ("b", True, "delay_ms"))
     ]
-    for shown in (levels, levels[1:2], [SimpleNamespace(block="b", revealed=True, vary=None)]):
-        yield str(sections.places(results(LIQUIDS, questions=asked, blocks=[], levels=shown)))
-    repeated = replace(asked[1], groups=(replace(groups[0], code="b"), replace(groups[1], code="c")))
+    for shown_levels in (levels, levels[1:2], [SimpleNamespace(block="b", revealed=True, vary=None)]):
+        yield str(sections.places(results(LIQUIDS, questions=question_results, blocks=[], levels=shown_levels)))
+    repeated = replace(question_results[1], groups=(replace(groups[0], code="b"), replace(groups[1], code="c")))
     for main in (levels[1:], levels[2:]):
-        yield sections.place_title(repeated, results(LIQUIDS, questions=asked[:1], levels=main, blocks=[]))
-    yield from (first_page._setting_words(name) for name in ("Water", "After Stirring"))
+        yield sections.place_title(repeated, results(LIQUIDS, questions=question_results[:1], levels=main, blocks=[]))
+    yield from (first_page._setting_text(name) for name in ("Water", "After Stirring"))
     lines = ["Oils: too few (P1).", "Waxes: too few (P2).", "sealed", "Oils: late", "Waxes: late", "Oils: few (P1)."]
     titles = [SimpleNamespace(title=title) for title in ("Oils", "Waxes")]
     yield from map(str, first_page._limits_by_subject(lines, results(LIQUIDS, blocks=[], levels=titles)))
@@ -287,16 +297,16 @@ def first_page_of_levels() -> Iterator[str]:
         block="b", title="Thickness", design="pair", revealed=True, times=(), summary="share", counts="correct",
         unit="N·s/m", level_kind="weber",
     )  # fmt: skip
-    for shown, attribute, words, rows in (
+    for shown_level, attribute, words, rows in (
         (level, "threshold", "threshold", group), (replace(level, level_kind="value"), "pse", "PSE", of_pse),
         (replace(level, revealed=False), "pse", "PSE", of_pse),
     ):  # fmt: skip
         with pytest.MonkeyPatch.context() as patch:
             estimates = SimpleNamespace(attribute=attribute, words=words, group=rows)
             patch.setattr(first_page, "estimates_of", lambda _level, estimates=estimates: estimates)
-            patch.setattr(first_page, "place_of", lambda one: one.standard)
-            found = results(LIQUIDS, blocks=[], levels=[shown])
-            yield from map(str, first_page.cards(found, presented={"b": first_page.Presented("With oil.")}))
+            patch.setattr(first_page, "place_of", lambda level: level.standard)
+            study_results = results(LIQUIDS, blocks=[], levels=[shown_level])
+            yield from map(str, first_page.cards(study_results, presented={"b": first_page.Presented("With oil.")}))
 
 
 def hypotheses() -> Iterator[str]:
@@ -305,11 +315,11 @@ def hypotheses() -> Iterator[str]:
 
     def hypothesis(measure: str, sides: tuple[Any, ...], **changes: Any) -> Any:
         contrast = SimpleNamespace(measure=measure, groups=None, expected=None, is_interaction=False, blocks=("b",))
-        given = {"p_adjusted": 0.3, "verdict": "inconclusive", "members": 2, "n": 12, "sd": 1.5, "ratio": False}
-        given |= {"standard_error": None, "largest": 6.0}
+        fields = {"p_adjusted": 0.3, "verdict": "inconclusive", "members": 2, "n": 12, "sd": 1.5, "ratio": False}
+        fields |= {"standard_error": None, "largest": 6.0}
         of_contrast = {name: changes.pop(name) for name in ("groups", "expected") if name in changes}
         return SimpleNamespace(
-            contrast=SimpleNamespace(**(vars(contrast) | of_contrast)), sides=sides, **(given | changes)
+            contrast=SimpleNamespace(**(vars(contrast) | of_contrast)), sides=sides, **(fields | changes)
         )
 
     two = side("water", -0.5, 0.5, 12, 0.8), side("oil", 0.1, 0.9, 12, 1.1)
@@ -323,9 +333,9 @@ def hypotheses() -> Iterator[str]:
         yield from sections._low_power_sentences(results(LIQUIDS, contrasts=rows))
         yield from sections._chance_level_sentences(results(LIQUIDS, contrasts=rows))
     trials = LIQUIDS.trials.assign(worst_gap_ms=[31.0, 5.0, 40.0, *[3.0] * 6], lateness_p99_ms=[9.0, *[1.0] * 8])
-    kept = {"worst_gap_ms": 20.0, "lateness_ms": 2.0}
-    yield sections._violated_limits_sentence(replace(LIQUIDS, trials=trials), kept)
-    yield sections._violated_limits_sentence(replace(LIQUIDS, trials=trials[3:]), kept) + "none"
+    kept_limits = {"worst_gap_ms": 20.0, "lateness_ms": 2.0}
+    yield sections._violated_limits_sentence(replace(LIQUIDS, trials=trials), kept_limits)
+    yield sections._violated_limits_sentence(replace(LIQUIDS, trials=trials[3:]), kept_limits) + "none"
 
 
 PARTS = (
@@ -339,13 +349,40 @@ PARTS = (
     methods_of_a_study,
     planned,
     motion,
-    limits,
+    limitation_lines,
 )
 
 
 def test_each_sentence_and_table_has_its_own_values() -> None:
     lines = (line for part in PARTS for line in (f"== {part.__name__}", *part()))
     check_kept(Path(__file__).with_name("how_it_was_run.txt"), lines)
+
+
+def test_the_methods_state_practice_trials_and_breaks() -> None:
+    trials = LIQUIDS.trials.assign(block="warm_up")
+    blocks = {
+        "warm_up": {"phase": "practice", "title": "Warm-up", "until": {"right": 4, "of": 4, "missed": "end"}},
+        "b": {"phase": "main", "title": "Stirring", "break_every": 3, "break_page": "rest"},
+        "c": {"phase": "main", "title": "Lifting"},
+    }
+    pages = {"rest": {"kind": "break", "min_s": 30}, "pause": {"kind": "break", "min_s": None}}
+    parts = {"blocks": blocks, "pages": pages, "sequence": ["warm_up", "b", "pause", "c"]}
+    protocol = LIQUIDS.protocol | {"study": {"languages": ["en"]}} | parts
+    study = replace(LIQUIDS, protocol=protocol, trials=pd.concat([LIQUIDS.trials, trials]))
+    counts = trials[trials["participant"].isin(study.people)].drop_duplicates(["participant", "session", "trial"])
+    per_person = counts["participant"].value_counts()
+    (sentence,) = practice_and_breaks.practice_sentences(study)
+    assert sentence.startswith(f"Participants completed {per_person.min()}")
+    assert sentence.endswith(
+        " in “Warm-up”; practice ended as soon as 4 answers in a row were correct; if this never happened, the session "
+        "ended."
+    )
+    assert practice_and_breaks.break_sentence(study) == (
+        "Participants had a break of at least 30 s after every 3 trials of “Stirring” and a break between parts of the "
+        "session."
+    )
+    empty = replace(LIQUIDS, protocol={})
+    assert ([*practice_and_breaks.practice_sentences(empty)], practice_and_breaks.break_sentence(empty)) == ([], "")
 
 
 @pytest.mark.parametrize(
@@ -361,7 +398,7 @@ def test_versions_are_those_of_the_included_sessions(
     versions: list[str], files: str, counted: list[bool], words: str
 ) -> None:
     people = LIQUIDS.participants.assign(protocol_version=versions, protocol_hash=[*files], counted=counted)
-    assert methods.version_words(replace(LIQUIDS, participants=people)) == words
+    assert methods.version_text(replace(LIQUIDS, participants=people)) == words
 
 
 @pytest.mark.parametrize(
@@ -373,7 +410,7 @@ def test_versions_are_those_of_the_included_sessions(
         (["MeanTests"], "slopes", "", "Means were used for the exploratory tests of means."),
     ],
 )
-def test_methods_name_what_means_were_used_for(
+def test_the_methods_name_the_uses_of_means(
     found: list[str], trends: str, blocks: str, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("Effects", "ContrastsWithControl", "DelayTrend", "MeanTests"):
@@ -381,9 +418,9 @@ def test_methods_name_what_means_were_used_for(
             methods, name, SimpleNamespace(**dict.fromkeys(("value_in", "tested"), lambda _, n=name: n in found))
         )
     contrasts = [SimpleNamespace(contrast=SimpleNamespace(blocks=[*blocks]))] if blocks else []
-    given: Any = SimpleNamespace(contrasts=contrasts, decided=SimpleNamespace(trends=trends))
-    *shown, used = methods._mean_sentences(given, [result_of(LIQUIDS)])
-    assert [line.startswith("Mean differences from the first condition") for line in shown] == [True] * (
+    evaluated: Any = SimpleNamespace(contrasts=contrasts, decided=SimpleNamespace(trends=trends))
+    *sentences, used = methods._mean_sentences(evaluated, [result_of(LIQUIDS)])
+    assert [line.startswith("Mean differences from the first condition") for line in sentences] == [True] * (
         "Effects" in found
     )
     assert used == words
@@ -391,6 +428,46 @@ def test_methods_name_what_means_were_used_for(
 
 @pytest.mark.parametrize(("settings", "are"), [({}, "are"), (LIQUIDS.settings, "were")])
 def test_conditions_are_codes_or_were_until_the_key_was_opened(settings: dict[Any, Any], are: str) -> None:
-    shown = replace(LIQUIDS, settings=settings)
-    (told,) = (line for line in methods._design_sentences(shown, results(shown)) if line.startswith("Conditions"))
-    assert told == f"Conditions {are} identified only by codes{' until the key was opened' if settings else ''}."
+    case_study = replace(LIQUIDS, settings=settings)
+    (conditions_line,) = (
+        line for line in methods._design_sentences(case_study, results(case_study)) if line.startswith("Conditions")
+    )
+    assert (
+        conditions_line
+        == f"Conditions {are} identified only by codes{' until the key was opened' if settings else ''}."
+    )
+
+
+def test_questions_that_are_not_always_asked_name_the_answer_on_which_they_depend() -> None:
+    place = SimpleNamespace(id="b", is_form=False)
+
+    def question(item: str, *, required: bool, rule: ShowIf | None = None) -> Any:
+        asked = SimpleNamespace(required=required, show_if=rule)
+        return SimpleNamespace(id=item, short=item.title(), where=place, levels={"left": "Left one"}, question=asked)
+
+    questions = (
+        question("hand", required=True),
+        question("why", required=False, rule=ShowIf(item="harder", at_most=3)),
+        question("ring", required=True, rule=ShowIf(item="hand", values="left")),
+    )
+    case_study: Any = replace(LIQUIDS, others=SimpleNamespace(questions=questions))
+    assert list(methods._other_question_sentences(case_study)) == [
+        "In “Block”, participants also answered 1 other question after each presentation.",
+        "In “Block”, participants could also answer 1 other question after each presentation if their answer to "
+        "“Harder” was at most 3.",
+        "In “Block”, participants also answered 1 other question after each presentation if their answer to “Hand” "
+        "was “Left one”.",
+    ]
+
+
+def test_participants_who_are_not_analysed_are_counted_with_their_reasons() -> None:
+    people = LIQUIDS.participants.assign(
+        participant=["P1", "P2", "P3"], counted=[False, False, True], excluded=[True, False, False]
+    )
+    gone = Tombstone(participant="P9", at="2026-02-03T10:00:00", by="BL", reason="asked", sessions=())
+    sentence = methods._sample_sentence(replace(LIQUIDS, participants=people, withdrawn=(gone, gone)))
+    assert sentence.startswith("Three participants (SIMULATED, not people) took part in “Made up”")
+    assert "); two more participants withdrew, and their data were erased. 1 participant did not" in sentence
+    assert "did not complete the session and 1 participant was excluded, so 1 participant was analysed" in sentence
+    alone = methods._sample_sentence(replace(LIQUIDS, withdrawn=(gone,)))
+    assert alone.endswith(", each in all conditions; 1 more participant withdrew, and their data were erased.")

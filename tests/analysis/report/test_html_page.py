@@ -12,7 +12,7 @@ ROW = ("Honey", "5.5", "2 to 6", "a difference")
 
 
 def classes(html: str, tag: str) -> list[str]:
-    """Return the class of each cell with this tag; "" without one."""
+    """Return the class of each cell with this tag, or ""."""
     return re.findall(rf'<{tag}(?: class="(\w+)")?>', html)
 
 
@@ -33,7 +33,7 @@ def test_columns_between_the_first_and_last_ones_are_numbers(columns: dict[str, 
 
 
 @pytest.mark.parametrize(("characters", "expected"), [(16, ""), (17, "words"), (LONG, "words"), (LONG + 1, "long")])
-def test_only_long_texts_wrap_and_no_number_does(characters: int, expected: str) -> None:
+def test_long_texts_wrap_but_numbers_do_not(characters: int, expected: str) -> None:
     html = table(HEAD[:2], [("x" * characters, "9" * 40)])
     assert classes(html, "td") == [expected, "n"]
 

@@ -120,8 +120,8 @@ def test_r_computes_each_hypothesis_from_the_tables(
     assert skipped in [line.strip() for line in lines]
     by_hypothesis: dict[int, dict[str, float]] = {}
     for line in lines:
-        if found := re.match(r"hypothesis (\d+), \w+: (.+?) +report +(\S+) +R +(\S+)", line):
-            by_hypothesis.setdefault(int(found[1]), {})[found[2]] = float(found[4])
+        if match := re.match(r"hypothesis (\d+), \w+: (.+?) +report +(\S+) +R +(\S+)", line):
+            by_hypothesis.setdefault(int(match[1]), {})[match[2]] = float(match[4])
     hypotheses = evaluate(load_study(folder), recordings=False).contrasts[:computed]
     assert [*by_hypothesis] == [*range(1, computed + 1)]
     for result, numbers in zip(hypotheses, by_hypothesis.values(), strict=True):

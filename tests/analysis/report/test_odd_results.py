@@ -27,7 +27,7 @@ from study_app.store.verification.whole_study import verify_study
 from tests.analysis.conftest import SAMPLE, Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("figures_of_the_page")]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("png_figures_only")]
 
 
 def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) -> None:
@@ -37,13 +37,13 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     results = twelve(make_results(tmp_path / "some", parse(text.encode(), "rek2024.toml")), people=5)
     results.open()
     study = load_study(results.folder)
-    told = methods(study, evaluate(study))
+    methods_lines = methods(study, evaluate(study))
     both = (
         "Holm method across 1 primary statement and by the Benjamini-Hochberg method across {} exploratory statements"
     )
-    assert both.format("eight") in told
-    assert both.format("four") in told
-    assert "and 90 % confidence intervals" in told, "two one-sided tests at 5 %"
+    assert both.format("eight") in methods_lines
+    assert both.format("four") in methods_lines
+    assert "and 90 % confidence intervals" in methods_lines, "two one-sided tests at 5 %"
 
 
 @pytest.mark.parametrize(
@@ -58,8 +58,8 @@ def test_limits_count_the_files_that_have_changed(names: tuple[str, ...], start:
     results = evaluate(study)
     assert not [line for line in limits(study, results) if "since recording" in line]
     doubts = tuple(Discrepancy(study.folder / name, "differs from its journal", "") for name in names)
-    told = [line for line in limits(replace(study, doubts=doubts), results) if "since recording" in line]
-    assert told == [
+    changed_file_limits = [line for line in limits(replace(study, doubts=doubts), results) if "since recording" in line]
+    assert changed_file_limits == [
         f"{start}changed since recording, so numbers may be wrong. The command liquid-study verify RESULTS checks all "
         "files."
     ]
@@ -71,8 +71,8 @@ def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_sta
     for number, who in enumerate("ABC"):
         place = small.add(who, lambda *_: 4).receipt
         receipt.write(place, {**receipt.read(place), "protocol_hash": f"{number // 2}" * 64})
-    gone = [trial.number for trial in build_schedule(small.protocol, "A", seed=1).trials if trial.code == "L1"]
-    for trial in gone:
+    trial_numbers = [trial.number for trial in build_schedule(small.protocol, "A", seed=1).trials if trial.code == "L1"]
+    for trial in trial_numbers:
         small.exclude("A", trial=trial)
     exclude(small.folder, "C", 1, by="AB", reason="late")
     small.open()
@@ -80,16 +80,16 @@ def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_sta
     exclude(small.folder, "B", 1, by="AB", reason="the phone rang", now=later)
     include(small.folder, "C", 1, by="AB", reason="it was complete", now=later)
     report(small.folder, tmp_path / "report")
-    told = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
+    methods_text = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
     assert (
-        "from 2 different files); at least one condition is missing for 1 participant, because individual trials were "
-        "excluded." in told
+        "from 2 different files). 1 participant was excluded, so two participants were analysed; at least one "
+        "condition is missing for 1 participant, because individual trials were excluded." in methods_text
     )
-    assert "The analysis does not include 1 excluded session and two excluded trials." in told
+    assert "For the other participants, the analysis does not include two excluded trials." in methods_text
     assert (
-        f"Some decisions about exclusions were made after the key was opened: 1 of {len(gone) + 1} exclusions "
+        f"Some decisions about exclusions were made after the key was opened: 1 of {len(trial_numbers) + 1} exclusions "
         "and the reversal of 1 exclusion."
-    ) in told
+    ) in methods_text
     rows = json.loads((tmp_path / "report" / "report.json").read_text("utf-8"))["exclusions"]
     assert [row["participant"] for row in rows if row["after_unblinding"]] == ["B"]
 
@@ -117,11 +117,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a sealed study of six participants in two groups."""
     path = tmp_path_factory.mktemp("grouped")
     (path / "grouped.toml").write_text(STUDY + GROUPS, encoding="utf-8", newline="\n")
-    felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
-    return rehearse_answers(path / "grouped.toml", participants=6, seed=2, results=path / "r", features=felt)
+    features = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
+    return rehearse_answers(path / "grouped.toml", participants=6, seed=2, results=path / "r", features=features)
 
 
-def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path) -> None:
+def test_groups_are_reported_only_after_unblinding(folder: Path, tmp_path: Path) -> None:
     sealed = load_study(folder)
     assert group_counts(sealed) == {}
     assert list(group_means(sealed)) == []
@@ -133,11 +133,11 @@ def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path
     study = load_study(folder)
     assert group_counts(study) == {"first_thick": 3, "first_thin": 3}
     rows = study.responses.merge(study.trials[["participant", "group"]].drop_duplicates(), on="participant")
-    for one in group_means(study):
-        here = rows[(rows["block"] == one.block) & (rows["code"] == one.code) & (rows["group"] == one.group)]
+    for mean in group_means(study):
+        here = rows[(rows["block"] == mean.block) & (rows["code"] == mean.code) & (rows["group"] == mean.group)]
         each = here.groupby("participant")["response"].mean()
-        assert (one.n, one.mean) == (len(each), pytest.approx(each.mean()))
-        assert one.sd == pytest.approx(each.std())
+        assert (mean.n, mean.mean) == (len(each), pytest.approx(each.mean()))
+        assert mean.sd == pytest.approx(each.std())
     assert len(list(group_means(study))) == 2 * 2 * 2
     report(folder, tmp_path / "opened")
     text = (tmp_path / "opened" / "report.html").read_text("utf-8")
@@ -186,8 +186,10 @@ conditions = ["stew", "soup"]
 
 def test_a_study_without_statements_in_two_sessions_and_languages_is_described(tmp_path: Path) -> None:
     (tmp_path / "counted.toml").write_text(COUNTED, encoding="utf-8", newline="\n")
-    felt = {("objects", condition): (NO_FEATURES,) for condition in ("soup", "stew")}
-    folder = rehearse_answers(tmp_path / "counted.toml", participants=4, seed=2, results=tmp_path / "r", features=felt)
+    features = {("objects", condition): (NO_FEATURES,) for condition in ("soup", "stew")}
+    folder = rehearse_answers(
+        tmp_path / "counted.toml", participants=4, seed=2, results=tmp_path / "r", features=features
+    )
     report(folder, tmp_path / "sealed")
     text = " ".join((tmp_path / "sealed" / "methods.txt").read_text("utf-8").split())
     assert "Each participant attended two sessions. The participants' texts were in German (n = 4)." in text
@@ -205,8 +207,10 @@ def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp
     (tmp_path / "grouped.toml").write_text(
         (STUDY + GROUPS).replace('study.name = "grouped"\n', head), encoding="utf-8", newline="\n"
     )
-    felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
-    study = rehearse_answers(tmp_path / "grouped.toml", participants=5, seed=2, results=tmp_path / "r", features=felt)
+    features = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
+    study = rehearse_answers(
+        tmp_path / "grouped.toml", participants=5, seed=2, results=tmp_path / "r", features=features
+    )
     assert group_counts(load_study(study)) == {"first_thick": 2, "first_thin": 3}, "dealt in turn"
     report(study, tmp_path / "sealed")
     methods = (tmp_path / "sealed" / "methods.txt").read_text("utf-8")

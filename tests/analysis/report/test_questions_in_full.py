@@ -48,8 +48,8 @@ def test_the_first_session_of_each_version_and_who_saved_it_are_read_from_receip
 
     assert [(content.participant, content.saved_by) for content in contents] == [("P001", "BC"), ("P002", "AK")]
     for content in contents:
-        held = receipt.read(StudyFolder(results).session(content.participant, 1).receipt)
-        assert (content.began, content.protocol) == (held["started_at"], held["protocol"])
+        session_receipt = receipt.read(StudyFolder(results).session(content.participant, 1).receipt)
+        assert (content.began, content.protocol) == (session_receipt["started_at"], session_receipt["protocol"])
     ((after, sentences),) = content_changes(contents)
     assert after.participant == "P002"
     assert len(sentences) == 1
@@ -90,19 +90,19 @@ def test_options_ends_and_labels_are_among_the_texts_and_their_rewording_is_a_ca
         ("Yes", "scale agree"),
     ):
         (caveat,) = changed_questions([reworded("", ""), reworded(old, "Otherwise")])
-        assert caveat.startswith(f"The wording of {place} changed in version 1.0 (first session: P001"), caveat
+        assert caveat.startswith(f"The wording of {place} changed in version 1.1 (first session: P001"), caveat
 
 
-@pytest.mark.usefixtures("figures_of_the_page")
-def test_the_report_has_every_wording_in_every_language_and_says_what_changed(rek: Results, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("png_figures_only")
+def test_the_report_shows_every_wording_in_every_language_and_its_changes(rek: Results, tmp_path: Path) -> None:
     rek.add("P001", lambda _condition, _item: 4)
     later = rek.add("P002", lambda _condition, _item: 4)
-    held = json.loads(later.receipt.read_text(encoding="utf-8"))
-    before = held["protocol"]["questionnaires"]
-    new = json.loads(json.dumps(held["protocol"]).replace(OLD, NEW))
+    content = json.loads(later.receipt.read_text(encoding="utf-8"))
+    before = content["protocol"]["questionnaires"]
+    new = json.loads(json.dumps(content["protocol"]).replace(OLD, NEW))
     new["study"]["version"] = "1.1"
     facts = {"protocol_hash": "2", "started_at": "2026-01-06T10:00:00.000+01:00", "saved_by": "AK"}
-    receipt.write(later.receipt, held | facts | {"protocol": new})
+    receipt.write(later.receipt, content | facts | {"protocol": new})
 
     page = report(rek.folder, tmp_path / "report")[0].read_text(encoding="utf-8")
 
@@ -115,4 +115,4 @@ def test_the_report_has_every_wording_in_every_language_and_says_what_changed(re
         "The wording of liquid.like_honey changed in version 1.1 (first session: P002, 2026-01-06; saved by AK)."
         in page
     )
-    assert "Changes in version 1.0" not in page
+    assert "Changes in version 1.1" not in page

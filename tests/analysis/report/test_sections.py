@@ -34,25 +34,26 @@ ITEMS = tuple(Item(id=item, text=f"It is {item}.", short=item.capitalize()) for 
 
 def block(name: str, **changes: Any) -> BlockResult:
     """Return the result of a block of the liquids Thin and Wax without any findings."""
-    made = BlockResult(
+    block_result = BlockResult(
         id=name, title=f"Block {name}", kind="liquids", revealed=True, n=3, settings=liquids(2), names=("Thin", "Wax"),
         items=ITEMS, labels=(), measures=(),
     )  # fmt: skip
-    return replace(made, **changes)
+    return replace(block_result, **changes)
 
 
 def results_of(*blocks: BlockResult, **changes: Any) -> Any:
     """Return results without hypotheses, questions and levels."""
-    held = dict.fromkeys(("contrasts", "questions", "levels", "delivered", "scores", "failures"), ())
+    fields = dict.fromkeys(("contrasts", "questions", "levels", "delivered", "scores", "failures"), ())
     decided = replace(DECIDED, primary=("warm",))
-    return SimpleNamespace(**{**held, "blocks": blocks, "orders": {}, "decided": decided, **changes})
+    fields |= {"blocks": blocks, "trial_blocks": blocks, "orders": {}, "block_orders": None}
+    return SimpleNamespace(**{**fields, "decided": decided, **changes})
 
 
 def of_people(number: int, **changes: Any) -> Any:
     """Return a study of so many people."""
-    made = study(liquids(2), list(everybody(liquids(2), number, lambda *_: 4)))
-    people = made.participants.assign(simulated=False, protocol_hash="h")
-    return replace(made, participants=people, **changes)
+    case_study = study(liquids(2), list(everybody(liquids(2), number, lambda *_: 4)))
+    people = case_study.participants.assign(simulated=False, protocol_hash="h")
+    return replace(case_study, participants=people, **changes)
 
 
 def outcome_of(item: str, verdict: str, note: str = "") -> Any:
@@ -117,9 +118,9 @@ def hypothesis(**changes: Any) -> Any:
     """Return a hypothesis that was not tested."""
     stated = {"groups": None, "is_interaction": False, "measure": "warm", "blocks": ("b",), "expected": None}
     contrast = SimpleNamespace(**{name: changes.pop(name, value) for name, value in stated.items()})
-    held = {"p_adjusted": None, "verdict": "not tested", "sides": (), "members": 1, "n": 12, "sd": None}
-    held |= {"largest": None if contrast.measure in OF_LEVELS else 6.0, "ratio": False, "standard_error": None}
-    return SimpleNamespace(contrast=contrast, **{**held, **changes})
+    fields = {"p_adjusted": None, "verdict": "not tested", "sides": (), "members": 1, "n": 12, "sd": None}
+    fields |= {"largest": None if contrast.measure in OF_LEVELS else 6.0, "ratio": False, "standard_error": None}
+    return SimpleNamespace(contrast=contrast, **{**fields, **changes})
 
 
 PAIRED, BETWEEN = {}, {"groups": ("old", "new")}
@@ -168,14 +169,14 @@ def test_the_limits_of_the_study_are_only_those_that_apply(
     hypotheses: list[dict[str, Any]], of_study: dict[str, Any], of_results: dict[str, Any], starts: list[str]
 ) -> None:
     changes = dict(of_study)
-    made = of_people(changes.pop("n", 12))
+    case_study = of_people(changes.pop("n", 12))
     for column, values in (("protocol_hash", "hashes"), ("protocol_version", "versions")):
-        if given := changes.pop(values, None):
-            filled = [*given, *given[-1] * (len(made.participants) - len(given))]
-            made = replace(made, participants=made.participants.assign(**{column: filled}))
+        if value := changes.pop(values, None):
+            filled = [*value, *value[-1] * (len(case_study.participants) - len(value))]
+            case_study = replace(case_study, participants=case_study.participants.assign(**{column: filled}))
     contrasts = [hypothesis(**stated) for stated in hypotheses]
     results = results_of(**{"blocks": (block("b"),), "contrasts": contrasts, **of_results})
-    lines = list(sections._general_sentences(replace(made, **changes), results))
+    lines = list(sections._general_sentences(replace(case_study, **changes), results))
     assert len(lines) == len(starts)
     assert [line[: len(start)] for line, start in zip(lines, starts, strict=True)] == starts
 
@@ -196,8 +197,8 @@ def test_the_trials_with_a_late_device_are_counted_main_trials() -> None:
         "In 2 of three trials in the main blocks, the device responded later than the servo assumed: in the worst case "
         "after at least 4 ticks instead of 1 or 2. "
     )
-    for shown in (trials[1:2], trials.drop(columns="device_delay_ticks")):
-        assert sections.limits(of_people(12, trials=shown), results_of(block("A"))) == ()
+    for presented in (trials[1:2], trials.drop(columns="device_delay_ticks")):
+        assert sections.limits(of_people(12, trials=presented), results_of(block("A"))) == ()
 
 
 def side(name: str, n: int, sd: float | None, low: float = 0.5) -> Any:
@@ -211,33 +212,32 @@ TWO = side("Oil", 12, 1.0), side("Wax", 12, 2.0)
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({}, "Hypothesis: with twelve participants and the observed variation between them, a mean difference must be"),
+        ({}, "Hypothesis: with twelve participants and the observed standard deviation, the true mean difference must"),
         ({"verdict": "shown"}, None),
         ({"verdict": "suggested"}, None),
         ({"verdict": "equivalent"}, None),
         ({"p_adjusted": None}, None),
         ({"sides": TWO[:1]}, None),
         ({"sides": (TWO[0], side("Wax", 12, None))}, None),
-        ({"sd": 8.0}, "Hypothesis: twelve participants are too few to find even the largest difference on the scale "),
-        ({"sd": 8.0, "measure": "threshold"}, "Hypothesis: with twelve participants and the observed variation "),
-        ({"n": 3, "sides": (side("Oil", 3, 1.0), side("Wax", 3, 1.0))}, "Hypothesis: three participants are too few "
-         "to find even a difference of 3 SD with 80 % power."),
+        ({"sd": 8.0}, "Hypothesis: with twelve participants, even the largest difference on the scale cannot be "
+         "detected "),
+        ({"sd": 8.0, "measure": "threshold"}, "Hypothesis: with twelve participants and the observed standard "),
+        ({"n": 3, "sides": (side("Oil", 3, 1.0), side("Wax", 3, 1.0))}, "Hypothesis: with three participants, even a "
+         "difference of 3 SD cannot be detected with 80 % power"),
     ],
 )  # fmt: skip
-def test_the_power_of_a_hypothesis_is_a_limit_if_nothing_was_shown(
-    changes: dict[str, Any], sentence: str | None
-) -> None:
+def test_low_power_is_a_limit_of_a_hypothesis_that_was_not_shown(changes: dict[str, Any], sentence: str | None) -> None:
     """Statements differ by at most 6 points; 80 % power needs a difference of 0.9 SD in twelve participants."""
-    given = hypothesis(**{"p_adjusted": 0.3, "verdict": "not shown", "sides": TWO, "sd": 1.5, **changes})
-    lines = list(sections._low_power_sentences(results_of(contrasts=[given])))
+    hypothesis_result = hypothesis(**{"p_adjusted": 0.3, "verdict": "not shown", "sides": TWO, "sd": 1.5, **changes})
+    lines = list(sections._low_power_sentences(results_of(contrasts=[hypothesis_result])))
     assert [line[: len(sentence or "")] for line in lines] == ([] if sentence is None else [sentence])
 
 
-def test_chance_is_no_limit_of_an_interaction() -> None:
+def test_a_chance_level_limits_hypotheses_but_not_interactions() -> None:
     sides = side("Oil", 12, 1.0, low=-0.1), side("Wax", 12, 1.0)
     for crossed, count in ((False, 1), (True, 0)):
-        given = hypothesis(measure="d_prime", sides=sides, is_interaction=crossed)
-        lines = list(sections._chance_level_sentences(results_of(contrasts=[given])))
+        hypothesis_result = hypothesis(measure="d_prime", sides=sides, is_interaction=crossed)
+        lines = list(sections._chance_level_sentences(results_of(contrasts=[hypothesis_result])))
         assert ["mean d′ in Oil includes 0" in line for line in lines] == [True] * count
 
 
@@ -259,8 +259,8 @@ def test_a_fixed_order_of_two_blocks_is_a_limit_of_their_comparison(
     sequence: list[str], changes: dict[str, Any], sentence: str | None
 ) -> None:
     stated = hypothesis(**{"blocks": ("late", "prompt"), **changes}, compared=("Quite late", "Prompt"))
-    made = of_people(3, protocol={"sequence": sequence, "blocks": {}, "questionnaires": {}, "study": {}})
-    lines = list(sections._fixed_order_sentences(made, results_of(contrasts=[stated])))
+    case_study = of_people(3, protocol={"sequence": sequence, "blocks": {}, "questionnaires": {}, "study": {}})
+    lines = list(sections._fixed_order_sentences(case_study, results_of(contrasts=[stated])))
     assert [line[: len(sentence or "")] for line in lines] == ([] if sentence is None else [sentence])
 
 
@@ -270,25 +270,27 @@ def test_the_limits_of_a_hypothesis_are_its_power_chance_and_order() -> None:
         measure="d_prime", blocks=("late", "prompt"), compared=("Late", "Prompt"), p_adjusted=0.3, verdict="not shown",
         sides=(side("Late", 12, 1.0, low=-0.5), TWO[1]), sd=1.5,
     )  # fmt: skip
-    made = of_people(12, protocol={"sequence": ["prompt", "late"], "blocks": {}, "questionnaires": {}, "study": {}})
-    lines = list(sections._general_sentences(made, results_of(block("b"), contrasts=[stated])))
+    case_study = of_people(
+        12, protocol={"sequence": ["prompt", "late"], "blocks": {}, "questionnaires": {}, "study": {}}
+    )
+    lines = list(sections._general_sentences(case_study, results_of(block("b"), contrasts=[stated])))
     assert [line[:40] for line in lines] == [
         "Hypothesis: with twelve participants and", "Hypothesis: the interval of the mean d′ ",
         "Hypothesis: all participants completed P",
     ]  # fmt: skip
-    shown = hypothesis(measure="d_prime", sides=stated.sides, verdict="shown")
-    assert list(sections._chance_level_sentences(results_of(contrasts=[shown]))) == []
+    hypothesis_result = hypothesis(measure="d_prime", sides=stated.sides, verdict="shown")
+    assert list(sections._chance_level_sentences(results_of(contrasts=[hypothesis_result]))) == []
 
 
 def test_conclusions_are_all_hypotheses_and_then_all_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     contrasts = [SimpleNamespace(name=name, verdict=f"verdict {name}") for name in ("first", "second")]
     monkeypatch.setattr(sections, "question", lambda contrast: f"{contrast.name}?")
     monkeypatch.setattr(sections, "answer", lambda contrast: f"{contrast.name}!")
-    given = (
+    all_answers = (
         Answer(question="distinguished", block="v", title="Videos", verdict="shown", text="two of them"),
         Answer(question="unchanged up to", block="d", title="Delays", verdict="equivalent", text="50 ms"),
     )
-    monkeypatch.setattr(sections, "answers", lambda _results: given)
+    monkeypatch.setattr(sections, "answers", lambda _results: all_answers)
     results = results_of(block("v", kind="views"), block("d", kind="delays"), contrasts=contrasts)
     assert sections.conclusions(results) == [
         ("Hypothesis", "first?", "verdict first", "first!"),
@@ -313,18 +315,20 @@ def test_questions_are_answered_only_of_blocks_with_answers_on_several_settings(
         block("D", revealed=False, **late),
         block("E", absent=(NotTested("equivalence test", "of haste"),), **late),
     )
-    given = [(answer.block, answer.question, answer.verdict, answer.text) for answer in sections.answers(results)]
+    answers_given = [
+        (answer.block, answer.question, answer.verdict, answer.text) for answer in sections.answers(results)
+    ]
     sealed = "sealed", "This question is answered after unblinding."
-    assert given[:3] == [
+    assert answers_given[:3] == [
         ("C", "distinguished", *sealed),
         ("D", "noticed from", *sealed),
         ("D", "unchanged up to", *sealed),
     ]
-    assert [answer[:3] for answer in given[3:]] == [
+    assert [answer[:3] for answer in answers_given[3:]] == [
         ("E", "noticed from", "not shown"),
         ("E", "unchanged up to", "not tested"),
     ]
-    assert given[4][3] == "This was not tested, because of haste."
+    assert answers_given[4][3] == "This was not tested, because of haste."
 
 
 def png(name: str, of: str) -> Picture:
@@ -332,14 +336,14 @@ def png(name: str, of: str) -> Picture:
 
 
 def test_a_block_has_its_parts_in_order_with_its_own_figures() -> None:
-    made = block(
+    block_result = block(
         "A", presentations=(2, 3), sessions=(1, 2), incomplete={"warm": ("P7",)},
         absent=(NotTested("trend", "few"), NotTested("pairs", "so")),
     )  # fmt: skip
-    made = replace(made, findings={"overall": SimpleNamespace(p=None, note="alike")})
-    drawn = [png(f"{kind}-x", of) for of in "AB" for kind in ("effects", "liquids", "delays")]
-    results = results_of(made, block("B"))
-    assert lines_of(sections.block(made, results, drawn)) == [
+    block_result = replace(block_result, findings={"overall": SimpleNamespace(p=None, note="alike")})
+    pictures = [png(f"{kind}-x", of) for of in "AB" for kind in ("effects", "liquids", "delays")]
+    results = results_of(block_result, block("B"))
+    assert lines_of(sections.block(block_result, results, pictures)) == [
         "Block A (liquids)",
         "Each participant rated each liquid 2 to 3 times. The tests use the median of these answers. The answers from "
         "sessions 1 and 2 are compared with each other, and are pooled in all other tests.",
@@ -351,10 +355,10 @@ def test_a_block_has_its_parts_in_order_with_its_own_figures() -> None:
         "The trend was not computed because few.",
         "The pairs was not computed because so.",
     ]
-    single = replace(made, names=("Thin",), settings=liquids(1))
-    assert "What could not be computed, and why" not in lines_of(sections.block(single, results, drawn))
-    late = replace(made, kind="delays", settings=delays([0, 50]), absent=())
-    lines = lines_of(sections.block(late, results, drawn))
+    single = replace(block_result, names=("Thin",), settings=liquids(1))
+    assert "What could not be computed, and why" not in lines_of(sections.block(single, results, pictures))
+    late = replace(block_result, kind="delays", settings=delays([0, 50]), absent=())
+    lines = lines_of(sections.block(late, results, pictures))
     assert [line for line in lines if line.startswith("Figure")] == ["Figure effects-x of A.", "Figure delays-x of A."]
     assert "Participants excluded from tests across all delays because an answer is missing: P7 (“Warm”)." in lines
 
@@ -370,10 +374,10 @@ def test_verdicts_are_explained_with_the_alpha_of_the_study_if_statements_are_te
 @pytest.mark.parametrize(
     ("failed", "sentence"), [("A", "the test was not computed because broken."), ("B", "No answers are included yet.")]
 )
-def test_a_block_without_answers_says_what_failed_if_it_failed_there(failed: str, sentence: str) -> None:
-    made = block("A", n=0, absent=(NotTested("test", "broken"),))
+def test_a_block_without_answers_names_the_failure_in_that_block(failed: str, sentence: str) -> None:
+    block_result = block("A", n=0, absent=(NotTested("test", "broken"),))
     failures = (Failure(what="test", error="e", where="w", block=failed),)
-    lines = lines_of(sections.block(made, results_of(made, failures=failures), (), Failures()))
+    lines = lines_of(sections.block(block_result, results_of(block_result, failures=failures), (), Failures()))
     assert lines == ["Block A (liquids)", sentence]
 
 
@@ -411,7 +415,7 @@ def test_counts_of_answers_are_those_of_each_statement_and_setting() -> None:
     ]
 
 
-def asked(where: str, item: str, measure: str, *groups: GroupAnswers, is_form: bool = True) -> QuestionResult:
+def question_result(where: str, item: str, measure: str, *groups: GroupAnswers, is_form: bool = True) -> QuestionResult:
     return QuestionResult(
         where=where, title=f"Title {where}", is_form=is_form, item=item, text=f"How {item}?", short=item.capitalize(),
         kind="number", measure=measure, figure=None, groups=groups,
@@ -439,11 +443,11 @@ def test_questions_have_their_own_scores_answers_and_figures() -> None:
     texts = [{"n": 1, "texts": [text]} for text in ("P1: dull", "P2: fine")]
     both = [GroupAnswers(code, name, numbers) for code, name, numbers in zip("ab", ("Oil", "Wax"), texts, strict=True)]
     questions = (
-        asked("end", "old", "distribution", GroupAnswers(None, "All", spread(9, 4.0))),
-        asked("start", "new", "distribution", GroupAnswers(None, "All", spread(9, 5.0))),
-        asked("b", "size", "distribution", GroupAnswers(None, "All", spread(9, 6.0)), is_form=False),
-        asked("end", "why", "texts", *both),
-        asked("end", "tired", "distribution", GroupAnswers(None, "All", {"n": 0})),
+        question_result("end", "old", "distribution", GroupAnswers(None, "All", spread(9, 4.0))),
+        question_result("start", "new", "distribution", GroupAnswers(None, "All", spread(9, 5.0))),
+        question_result("b", "size", "distribution", GroupAnswers(None, "All", spread(9, 6.0)), is_form=False),
+        question_result("end", "why", "texts", *both),
+        question_result("end", "tired", "distribution", GroupAnswers(None, "All", {"n": 0})),
     )
     scores = [
         score("end", "raw", "Hart 2006", 41.0),
@@ -458,8 +462,8 @@ def test_questions_have_their_own_scores_answers_and_figures() -> None:
         levels=(),
     )
     results = results_of(questions=questions, scores=scores)
-    drawn = [png(f"question-{name}", "end") for name in ("end-new", "end-old", "start-old")]
-    assert lines_of(sections.question_section("end", of_study, results, drawn)) == [
+    pictures = [png(f"question-{name}", "end") for name in ("end-new", "end-old", "start-old")]
+    assert lines_of(sections.question_section("end", of_study, results, pictures)) == [
         "Title end: form",
         "Scores",
         "Score | Answers | n | mean | SD | SE | range",
@@ -497,11 +501,11 @@ def test_questions_have_their_own_scores_answers_and_figures() -> None:
 def test_a_form_is_said_to_follow_each_block_only_if_it_follows_all_main_blocks(
     codes: str, blocks: str, title: str
 ) -> None:
-    form = asked("load", "raw", "distribution", *(GroupAnswers(code, code, spread(9, 4.0)) for code in codes))
-    others = asked("C", "size", "distribution", is_form=False), asked("end", "age", "distribution")
+    form = question_result("load", "raw", "distribution", *(GroupAnswers(code, code, spread(9, 4.0)) for code in codes))
+    others = question_result("C", "size", "distribution", is_form=False), question_result("end", "age", "distribution")
     levels = [SimpleNamespace(block="L")] if "L" in codes else []
-    made = results_of(*map(block, blocks), questions=(form, *others), levels=levels)
-    assert sections.place_title(form, made) == title
+    results = results_of(*map(block, blocks), questions=(form, *others), levels=levels)
+    assert sections.place_title(form, results) == title
 
 
 @pytest.mark.parametrize(
@@ -520,7 +524,7 @@ def test_answers_in_a_block_of_levels_are_shown_unless_starting_levels_differ(
         for name in ("c", "b")
     ]
     oil = GroupAnswers("L1", "Oil", spread(9, 4.0))
-    questions = (asked("b", "size", "distribution", oil, is_form=False),)
+    questions = (question_result("b", "size", "distribution", oil, is_form=False),)
     placed = SimpleNamespace(where=SimpleNamespace(id="b"), id="size")
     blocks = [SimpleNamespace(id=name, design=SimpleNamespace(first=modulus)) for name in "cb"]
     of_study: Any = SimpleNamespace(
@@ -569,8 +573,8 @@ def test_the_sessions_with_lost_trials_are_listed_with_their_settings_up_to_a_nu
         }
     )
     levels = [SimpleNamespace(id="b", title="Pitch")]
-    made: Any = SimpleNamespace(levels=levels, participants=people, settings=settings, protocol={})
-    heading, _, head, *rows, more = lines_of(sections._missing_trials_part(made))
+    case_study: Any = SimpleNamespace(levels=levels, participants=people, settings=settings, protocol={})
+    heading, _, head, *rows, more = lines_of(sections._missing_trials_part(case_study))
     assert (heading, head) == ("Trials that were not delivered", "Session | missing | of which | reason | session")
     assert rows == [
         f"P{n}, session 2 | {n} of 40 | Pitch, {name}: {n} | late | {'included' if n % 2 else 'not included'}"
@@ -588,8 +592,8 @@ def test_limits_are_exceeded_only_by_counted_main_trials() -> None:
             "lateness_p99_ms": [3.0, np.nan, 4.0, 5.0],
         }
     )
-    made: Any = SimpleNamespace(trials=trials)
-    sentence = sections._violated_limits_sentence(made, {"worst_gap_ms": 20.0, "lateness_ms": 2.0})
+    case_study: Any = SimpleNamespace(trials=trials)
+    sentence = sections._violated_limits_sentence(case_study, {"worst_gap_ms": 20.0, "lateness_ms": 2.0})
     assert sentence.startswith("1 of 2 trials exceeded a limit: ")
     assert sentence.count("(1 trial)") == 2
 
@@ -621,7 +625,7 @@ def test_reversed_exclusions_of_a_merged_study_name_the_site(monkeypatch: pytest
     ]
 
 
-def test_planned_rules_are_listed_even_if_nothing_was_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_planned_rules_are_listed_even_without_exclusions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sections, "rule_sentences", lambda *_: ["A rule.", "Another one."])
     lines = lines_of(sections.conduct(of_people(3), results_of()))
     assert lines[lines.index("Exclusions") + 1 :] == ["There are no exclusions.", "A rule.", "Another one."]
@@ -632,8 +636,8 @@ def test_exclusions_by_a_rule_of_the_program_are_named_as_such(count: int, verb:
     people = of_people(3).participants
     people = people.assign(counted=[number >= count for number in range(3)])
     by_rule = replace(LATE, participant="P2", rule_or_person="catch")
-    made = replace(of_people(3), participants=people, exclusions=(LATE, by_rule))
-    lines = lines_of(sections.conduct(made, results_of()))
+    case_study = replace(of_people(3), participants=people, exclusions=(LATE, by_rule))
+    lines = lines_of(sections.conduct(case_study, results_of()))
     assert lines[lines.index("Exclusions") + 1 :] == [
         "participant P1, session 1: spoke (AK, 2026-03-02T09:00:00)",
         "participant P2, session 1: spoke (rule catch, 2026-03-02T09:00:00)",

@@ -18,6 +18,7 @@ from study_app.analysis.report import methods as methods_module
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import cards
 from study_app.analysis.report.methods import methods
+from study_app.analysis.report.motion_section import _recordings_sentence
 from study_app.analysis.report.sections import false_claims_sentence, limits, no_findings_sentence
 from study_app.analysis.results import Failures
 from study_app.analysis.statistics.outcome import alpha_of_looks
@@ -25,7 +26,7 @@ from study_app.analysis.wording import all_of
 from study_app.protocol.model import Contrast
 from tests.analysis.made_up import DECIDED, ITEMS, everybody, liquids, study
 from tests.analysis.random_studies import drawn
-from tests.analysis.report.sentences import Told, check, check_verdicts
+from tests.analysis.report.sentences import ReportNumbers, check, check_verdicts
 
 STUDIES = 300
 COVERING = {2, 9, 15, 16, 17, 19, 23, 29, 66, 68, 74, 75, 104, 106, 152, 158, 226, 263}
@@ -34,10 +35,10 @@ COVERING = {2, 9, 15, 16, 17, 19, 23, 29, 66, 68, 74, 75, 104, 106, 152, 158, 22
 
 def with_plan(rng: np.random.Generator) -> Study:
     """Return a random study; some have hypotheses of conditions and groups, and planned looks."""
-    made = drawn(rng)
-    (block,) = made.blocks
+    planned_study = drawn(rng)
+    (block,) = planned_study.blocks
     settings, contrasts = block.settings, []
-    if len(settings) > 1 and made.n:
+    if len(settings) > 1 and planned_study.n:
         for item in ITEMS[: int(rng.integers(0, 3))]:
             first, second = (settings[place].condition for place in rng.choice(len(settings), 2, replace=False))
             bound, expected = rng.choice([0.5, 1.0, 3.0]), rng.choice(["higher", "lower", ""])
@@ -50,20 +51,22 @@ def with_plan(rng: np.random.Generator) -> Study:
                     expected=str(expected) or None,
                 )
             )
-    if made.n and rng.random() < 0.4:
-        members = {person: ("trained", "naive")[number % 3 == 0] for number, person in enumerate(made.people)}
+    if planned_study.n and rng.random() < 0.4:
+        members = {person: ("trained", "naive")[number % 3 == 0] for number, person in enumerate(planned_study.people)}
         groups = {"trained": {"share": 2, "sequence": ["b"]}, "naive": {"share": 1, "sequence": ["b"]}}
-        trials = made.trials.assign(group=made.trials["participant"].map(members).astype("string"))
-        made = replace(made, trials=trials, protocol={**made.protocol, "study": {}, "groups": groups})
+        trials = planned_study.trials.assign(group=planned_study.trials["participant"].map(members).astype("string"))
+        planned_study = replace(
+            planned_study, trials=trials, protocol={**planned_study.protocol, "study": {}, "groups": groups}
+        )
         bound = float(rng.choice([0.5, 1.0])) if rng.random() < 0.5 else None
         contrasts.append(Contrast(measure=ITEMS[1], blocks=("b",), groups=("trained", "naive"), bound=bound))
     rising = (ITEMS[:1], ITEMS, ())[int(rng.integers(0, 3))]
     falling = ITEMS[1:] if rising == ITEMS[:1] and rng.random() < 0.5 else ()
-    made = replace(made, decided=replace(made.decided, rising=rising, falling=falling))
-    if made.decided.made and rng.random() < 0.4:
-        made = replace(made, decided=replace(made.decided, looks=(5, 12, 20), alpha=0.05))
-        made = replace(made, decided=made.decided.at(made.n))
-    return with_forms(replace(made, contrasts=tuple(contrasts)), rng)
+    planned_study = replace(planned_study, decided=replace(planned_study.decided, rising=rising, falling=falling))
+    if planned_study.decided.made and rng.random() < 0.4:
+        planned_study = replace(planned_study, decided=replace(planned_study.decided, looks=(5, 12, 20), alpha=0.05))
+        planned_study = replace(planned_study, decided=planned_study.decided.at(planned_study.n))
+    return with_forms(replace(planned_study, contrasts=tuple(contrasts)), rng)
 
 
 def with_forms(made: Study, rng: np.random.Generator) -> Study:
@@ -79,7 +82,7 @@ def with_forms(made: Study, rng: np.random.Generator) -> Study:
         for form in ("start", "load", "end")
     }
     order, phase = rng.choice(["fixed", "random"]), rng.choice(["main", "main", "practice"])
-    kept = made.protocol | {
+    protocol_tables = made.protocol | {
         "format": 2,
         "study": {"languages": ["en"], "block_order": str(order)},
         "blocks": {
@@ -90,31 +93,31 @@ def with_forms(made: Study, rng: np.random.Generator) -> Study:
         "scales": {},
         "analysis": {"exclusions": rules},
     }
-    groups = {name: {**group, "sequence": steps} for name, group in kept.get("groups", {}).items()}
-    kept |= {"groups": groups} if groups else {"sequence": [str(step) for step in steps]}
-    return replace(made, protocol=kept, others=other_questions(kept, None))
+    groups = {name: {**group, "sequence": steps} for name, group in protocol_tables.get("groups", {}).items()}
+    protocol_tables |= {"groups": groups} if groups else {"sequence": [str(step) for step in steps]}
+    return replace(made, protocol=protocol_tables, others=other_questions(protocol_tables, None))
 
 
 def check_report(made: Study) -> None:
     """Check the first page, the limits and the methods of a study."""
     results = evaluate(made)
     assert results.failures == ()
-    told = Told(made, results)
-    check_verdicts(told)
-    for place, one in enumerate(results.contrasts):
-        check(answer(one), replace(told, only=place))
+    report = ReportNumbers(made, results)
+    check_verdicts(report)
+    for place, contrast in enumerate(results.contrasts):
+        check(answer(contrast), replace(report, only=place))
     for line in limits(made, results):
-        check(line, told)
-    check(results.decided.look_words(len(results.people)), told)
-    check(false_claims_sentence(made.n), told)
-    check(methods(made, results), told)
+        check(line, report)
+    check(results.decided.look_text(len(results.people)), report)
+    check(false_claims_sentence(made.n), report)
+    check(methods(made, results), report)
     assert "  " not in methods(made, results)
-    shown = cards(replace(results, contrasts=()))  # theirs are checked one by one
-    for card in shown:
+    answer_cards = cards(replace(results, contrasts=()))  # theirs are checked one by one
+    for card in answer_cards:
         for sentence in card.sentences:
-            check(sentence, told)
+            check(sentence, report)
     if not cards(results):
-        check(no_findings_sentence(results), told)
+        check(no_findings_sentence(results), report)
 
 
 @pytest.mark.slow
@@ -152,9 +155,9 @@ def test_a_form_is_completed_between_the_blocks_if_main_blocks_are_exchanged(
 
 def test_missing_trials_are_those_of_included_sessions() -> None:
     sessions = [(True, 30, 4), (False, 50, 7), (True, 20, 1)]
-    missing = [SimpleNamespace(asked=asked, count=count) for _, asked, count in sessions]
-    counted = [included for included, *_ in sessions]
-    participants = pd.DataFrame({"counted": [*counted, True], "missing": [*missing, None]})
+    missing = [SimpleNamespace(asked=trials_asked, count=count) for _, trials_asked, count in sessions]
+    is_counted = [included for included, *_ in sessions]
+    participants = pd.DataFrame({"counted": [*is_counted, True], "missing": [*missing, None]})
     study: Any = SimpleNamespace(levels=["block"], participants=participants)
     assert methods_module._missing_trials_sentence(study).startswith("5 of 50 main trials were lost because ")
 
@@ -178,7 +181,7 @@ def test_a_part_of_a_section_that_fails_is_named(monkeypatch: pytest.MonkeyPatch
     def fail(*_: Any) -> str:
         raise ValueError
 
-    monkeypatch.setattr(sections, "incomplete_words", fail)
+    monkeypatch.setattr(sections, "incomplete_answers_sentence", fail)
     results = evaluate(drawn(np.random.default_rng(1)))
     incomplete, failures = replace(results.blocks[0], incomplete={ITEMS[0]: ("P001",)}), Failures()
     list(sections.block(incomplete, results, (), failures))
@@ -190,14 +193,14 @@ def test_the_planned_sample_is_a_number_of_participants_or_of_looks(look: int | 
     decided = replace(DECIDED, alpha=0.0123, planned_alpha=0.04, looks=(7, 12), spending="pocock", look=look)
     planned: Any = SimpleNamespace(protocol={"analysis": {"participants": 31}})
     results: Any = SimpleNamespace(decided=replace(decided, looks=()) if look is None else decided, people=("P1",) * 7)
-    said = methods_module._sample_size_sentences(planned, results)
+    sentences = methods_module._sample_size_sentences(planned, results)
     if look is None:
-        assert said == "The planned sample size was 31 participants."
+        assert sentences == "The planned sample size was 31 participants."
         assert methods_module._sample_size_sentences(SimpleNamespace(protocol={"analysis": None}), results) == ""
         return
     first, second = (f"{level:.3g}" for level in alpha_of_looks((7, 12), 0.04, "pocock"))
-    assert decided.look_words(7) in said
-    assert f"up to {first} and {second} are significant (Pocock alpha spending with alpha = 0.04, Lan" in said
+    assert decided.look_text(7) in sentences
+    assert f"up to {first} and {second} are significant (Pocock alpha spending with alpha = 0.04, Lan" in sentences
 
 
 def test_a_form_is_named_with_its_questions_and_the_times_at_which_it_is_completed() -> None:
@@ -234,8 +237,10 @@ def test_a_form_of_some_sessions_is_named_with_them(sequences: dict[str, list[li
     question: Any = SimpleNamespace(where=SimpleNamespace(id="load", title="Workload", is_form=True))
     head = {"study": {"languages": ["en"], "block_order": "fixed"}, "blocks": blocks, "questionnaires": {}}
     study: Any = SimpleNamespace(others=SimpleNamespace(questions=(question,)), protocol=head | own)
-    (said,) = methods_module._form_sentences(study)
-    assert said == f"Participants completed the questionnaire “Workload” (1 question) before the first block, {when}."
+    (sentences,) = methods_module._form_sentences(study)
+    assert (
+        sentences == f"Participants completed the questionnaire “Workload” (1 question) before the first block, {when}."
+    )
 
 
 @pytest.mark.parametrize(
@@ -253,7 +258,7 @@ def test_recordings_are_counted_with_the_reasons_and_the_trials_beyond_limits(
 ) -> None:
     names = ("recorded", "trials", "judged", "invalid")
     measured: Any = SimpleNamespace(unread=("lost",), **dict(zip(names, counts, strict=True)))
-    assert sentence in sections._recordings_sentence(measured)
+    assert sentence in _recordings_sentence(measured)
 
 
 def test_orders_are_shown_by_position_for_blocks_with_several_orders() -> None:
@@ -278,7 +283,7 @@ def test_orders_are_shown_by_position_for_blocks_with_several_orders() -> None:
         "c": order(0, ("N1", "N2"), ((1, 1),), (1,), True),
         "d": order(6, ("O1",), ((6,),), (1,), True),
     }
-    results: Any = SimpleNamespace(blocks=blocks, orders=orders)
+    results: Any = SimpleNamespace(trial_blocks=blocks, orders=orders)
     text = " ".join(re.sub(r"<[^>]+>", " ", "".join(map(str, sections._trial_orders_part(results)))).split())
     assert text == (
         "Trial orders A (seven orders): positions were not balanced; each condition occurred 2 to 5 times in each "
@@ -298,16 +303,16 @@ def test_common_methods_name_adjustment_alpha_and_missing_answers() -> None:
     blocks = [block("a", {"harder": ("P001", "P002")}), block("b", {"different": ("P002",), "harder": ("P005",)})]
     untested = replace(block("c", {}), findings={})
     for count, holm in ((1, "."), (2, ", Holm-adjusted across two blocks.")):
-        said = list(
+        sentences = list(
             methods_module._common_sentences(
                 replace(evaluated, decided=decided, performance=None), [*blocks[:count], untested]
             )
         )
-        assert said[0].endswith(f"in its block{holm}")
-        assert said[1] == (
+        assert sentences[0].endswith(f"in its block{holm}")
+        assert sentences[1] == (
             "Alpha (0.04) and the primary statements (“different”) were specified before the first session."
         )
-        assert f"{count + 1} participants with a missing answer" in said[-1].lower()
+        assert f"{count + 1} participants with a missing answer" in sentences[-1].lower()
     changed = replace(evaluated, decided=replace(decided, changed=True), performance=None)
     assert "changed between sessions" in list(methods_module._common_sentences(changed, blocks))[1]
     unplanned = replace(evaluated, decided=replace(decided, made=False), performance=None)
@@ -331,10 +336,15 @@ def test_answers_are_placed_by_person_setting_and_time() -> None:
 
 def test_means_of_groups_are_those_of_their_members() -> None:
     people = {"P000": "trained", "P001": "naive", "P002": "trained"}
-    made = study(liquids(2), list(everybody(liquids(2), 3, lambda p, s, c, i: 1 + p * 2 + (c == "L2"), repetitions=2)))
-    made = replace(made, participants=made.participants.assign(group=made.participants["participant"].map(people)))
-    assert group_counts(made) == {"naive": 1, "trained": 2}
-    rows = [row for row in group_means(made) if row.item == ITEMS[1]]
+    case_study = study(
+        liquids(2), list(everybody(liquids(2), 3, lambda p, s, c, i: 1 + p * 2 + (c == "L2"), repetitions=2))
+    )
+    case_study = replace(
+        case_study,
+        participants=case_study.participants.assign(group=case_study.participants["participant"].map(people)),
+    )
+    assert group_counts(case_study) == {"naive": 1, "trained": 2}
+    rows = [row for row in group_means(case_study) if row.item == ITEMS[1]]
     assert [(row.code, row.group, row.n, row.mean) for row in rows] == [
         ("L1", "naive", 1, 3.0), ("L1", "trained", 2, 3.0), ("L2", "naive", 1, 4.0), ("L2", "trained", 2, 4.0),
     ]  # fmt: skip
@@ -349,9 +359,14 @@ def test_statements_are_counted_in_words(number: int, words: str) -> None:
 
 
 def test_a_sample_is_whole_only_if_each_condition_of_each_block_has_everybody() -> None:
-    made = replace(study(liquids(2), list(everybody(liquids(2), 3, lambda p, s, c, i: 4))), sites=("A", "B"))
-    partly = replace(made, blocks=(*made.blocks, replace(made.blocks[0], id="c")))
-    for sample, ends in ((made, ", each in all conditions."), (partly, ", but some did not complete all conditions.")):
-        said = methods_module._sample_sentence(sample)
-        assert said.startswith("Three participants (SIMULATED, not people) took part in “Made up” (protocol made_up, v")
-        assert said.endswith(f" at the sites A and B{ends}")
+    case_study = replace(study(liquids(2), list(everybody(liquids(2), 3, lambda p, s, c, i: 4))), sites=("A", "B"))
+    partly = replace(case_study, blocks=(*case_study.blocks, replace(case_study.blocks[0], id="c")))
+    for sample, ends in (
+        (case_study, ", each in all conditions."),
+        (partly, ", but some did not complete all conditions."),
+    ):
+        sentences = methods_module._sample_sentence(sample)
+        assert sentences.startswith(
+            "Three participants (SIMULATED, not people) took part in “Made up” (protocol made_up, v"
+        )
+        assert sentences.endswith(f" at the sites A and B{ends}")

@@ -42,46 +42,46 @@ def fail(*_args: object, **_named: object) -> None:
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Results:
+def opened_study(tmp_path_factory: pytest.TempPathFactory) -> Results:
     results = twelve(make_results(tmp_path_factory.mktemp("failures") / "rek2024", load("rek2024")), people=10)
     results.open()
     return results
 
 
 @pytest.mark.nightly
-def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: pytest.MonkeyPatch) -> None:
-    study = load_study(opened.folder)
+def test_a_failing_test_does_not_affect_the_others(opened_study: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = load_study(opened_study.folder)
     whole = evaluate(study)
     assert whole.failures == ()
     for broken, (block, what) in TESTS.items():
         with monkeypatch.context() as patch:
             patch.setattr(f"study_app.analysis.{broken}", fail)
             results = evaluate(study)
-        failures = [one for one in results.failures if one.block == block]
-        assert [one.what for one in failures] == [what], broken
-        found = next(one for one in results.blocks if one.id == block)
-        (absent,) = (one for one in found.absent if one.what == what)
+        failures = [failure for failure in results.failures if failure.block == block]
+        assert [failure.what for failure in failures] == [what], broken
+        block_result = next(block_results for block_results in results.blocks if block_results.id == block)
+        (absent,) = (absence for absence in block_result.absent if absence.what == what)
         assert "ValueError: f(a) and f(b) must have different signs" in absent.why
         json.dumps(as_json_types(results), allow_nan=False)
-        assert OverAll.value_in(found) is not None or "over all" in what
+        assert OverAll.value_in(block_result) is not None or "over all" in what
         assert results.performance is not None
 
 
 def test_a_report_with_failures_is_written_and_ends_with_three(
-    opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    opened_study: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for broken in (*WRITING, "findings.delays.detection_threshold"):
         monkeypatch.setattr(f"study_app.analysis.{broken}", fail)
     to = tmp_path / "report"
-    done = CliRunner().invoke(commands, ["report", str(opened.folder), "--to", str(to)])
-    assert done.exit_code == 3, done.output
-    told = json.loads((to / "report.json").read_bytes())
-    failed = {one["what"] for one in told["failures"]}
+    result = CliRunner().invoke(commands, ["report", str(opened_study.folder), "--to", str(to)])
+    assert result.exit_code == 3, result.output
+    content = json.loads((to / "report.json").read_bytes())
+    failed = {failure["what"] for failure in content["failures"]}
     assert {*WRITING.values(), "detection threshold"} <= failed
-    assert told["results"]["blocks"][1]["trends"]
+    assert content["results"]["blocks"][1]["trends"]
     page = (to / "report.html").read_text(encoding="utf-8")
-    for one in told["failures"]:
-        assert one["what"] in done.output
+    for failure in content["failures"]:
+        assert failure["what"] in result.output
     for title in (
         "Do answers change with the delay?",
         "Shortest delay with a trend",

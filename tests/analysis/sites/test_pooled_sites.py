@@ -33,7 +33,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
 @pytest.fixture(scope="module")
-def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sealed_pool(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a merged study of two sites with three participants each; do not change it."""
     root = tmp_path_factory.mktemp("labs")
     folders = {
@@ -45,10 +45,10 @@ def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def opened(sealed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def opened_pool(sealed_pool: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the same with both keys open."""
     folder = tmp_path_factory.mktemp("opened") / "pooled"
-    merge_sites(_copied(sealed, folder.parent), folder)
+    merge_sites(_copied(sealed_pool, folder.parent), folder)
     unblind_folder(folder, "AK", "closed")
     return folder
 
@@ -58,29 +58,29 @@ def _copied(merged: Path, to: Path) -> dict[str, Path]:
 
 
 @pytest.mark.nightly
-def test_codes_of_sealed_sites_are_never_pooled(sealed: Path, tmp_path: Path) -> None:
-    found = load_study(sealed)
-    assert not found.revealed
-    assert found.people == ("A-P001", "A-P002", "A-P003", "B-P001", "B-P002", "B-P003")
-    for block in found.blocks:
+def test_codes_of_sealed_sites_are_never_pooled(sealed_pool: Path, tmp_path: Path) -> None:
+    study = load_study(sealed_pool)
+    assert not study.revealed
+    assert study.people == ("A-P001", "A-P002", "A-P003", "B-P001", "B-P002", "B-P003")
+    for block in study.blocks:
         codes = [code.partition("-") for code in block.codes]
         assert {site for site, _, _ in codes} == {"A", "B"}
         for site in "AB":
-            own = load_study(sealed / "sites" / site)
-            assert [code for one, _, code in codes if one == site] == list(
-                next(one for one in own.blocks if one.id == block.id).codes
+            own = load_study(sealed_pool / "sites" / site)
+            assert [code for site_code, _, code in codes if site_code == site] == list(
+                next(site_block for site_block in own.blocks if site_block.id == block.id).codes
             )
-    rows = found.responses
+    rows = study.responses
     assert (rows["code"].str.partition("-")[0] == rows["participant"].str.partition("-")[0]).all()
-    report(sealed, tmp_path, failed=pytest.fail)
+    report(sealed_pool, tmp_path, failed=pytest.fail)
     page = read(tmp_path)
     assert "Codes differ between sites until all keys are open" in page
     for condition in ("light_oil", "delay_75"):
         assert condition not in page
 
 
-def test_a_study_is_sealed_until_the_last_key_is_open(sealed: Path, tmp_path: Path) -> None:
-    folders = _copied(sealed, tmp_path)
+def test_a_study_is_sealed_until_the_last_key_is_open(sealed_pool: Path, tmp_path: Path) -> None:
+    folders = _copied(sealed_pool, tmp_path)
     merge_sites(folders, tmp_path / "pooled")
     unblind(tmp_path / "pooled/sites/B", "AK", "closed")
     half = load_study(tmp_path / "pooled")
@@ -91,8 +91,8 @@ def test_a_study_is_sealed_until_the_last_key_is_open(sealed: Path, tmp_path: Pa
     assert "force_mean_n" not in table.read_text("utf-8").splitlines()[0]
 
 
-def test_conditions_of_sealed_sites_are_not_counted_or_compared_across_sites(sealed: Path, tmp_path: Path) -> None:
-    merge_sites(_copied(sealed, tmp_path), tmp_path / "pooled")
+def test_conditions_of_sealed_sites_are_not_counted_or_compared_across_sites(sealed_pool: Path, tmp_path: Path) -> None:
+    merge_sites(_copied(sealed_pool, tmp_path), tmp_path / "pooled")
     unblind(tmp_path / "pooled/sites/B", "AK", "closed")
     half = load_study(tmp_path / "pooled")
     results = evaluate(half, recordings=False)
@@ -114,21 +114,21 @@ def test_conditions_of_sealed_sites_are_not_counted_or_compared_across_sites(sea
     assert not any("could not be tested" in sentence or "sessions" in sentence for sentence in sentences)
 
 
-def test_a_site_whose_folder_is_missing_is_not_left_out(sealed: Path, tmp_path: Path) -> None:
-    merge_sites(_copied(sealed, tmp_path), tmp_path / "pooled")
+def test_a_site_whose_folder_is_missing_is_not_left_out(sealed_pool: Path, tmp_path: Path) -> None:
+    merge_sites(_copied(sealed_pool, tmp_path), tmp_path / "pooled")
     shutil.rmtree(tmp_path / "pooled/sites/B")
     with pytest.raises(StoreError, match=r"sites/B is missing, but sites\.json lists it"):
         load_study(tmp_path / "pooled")
 
 
-def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tmp_path: Path) -> None:
-    merge_sites(_copied(sealed, tmp_path), tmp_path / "pooled")
-    found = load_study(tmp_path / "pooled")
-    one = Commitment(
-        study=found.name,
-        version=found.version,
-        protocol_hash=found.participants["protocol_hash"].iloc[0],
-        participants=found.n,
+def test_a_site_without_the_preregistration_of_another_is_named(sealed_pool: Path, tmp_path: Path) -> None:
+    merge_sites(_copied(sealed_pool, tmp_path), tmp_path / "pooled")
+    study = load_study(tmp_path / "pooled")
+    commitment = Commitment(
+        study=study.name,
+        version=study.version,
+        protocol_hash=study.participants["protocol_hash"].iloc[0],
+        participants=study.n,
         precision=None,
         rules=(),
     )
@@ -136,15 +136,15 @@ def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tm
     def said(**others: Commitment) -> tuple[str, ...]:
         for site, own in others.items():
             (tmp_path / "pooled/sites" / site / FILE).write_text(commitment_lines(own), encoding="utf-8", newline="\n")
-        compared = deviations(found)
+        compared = deviations(study)
         assert compared is not None
         return compared.found
 
-    assert said(B=one) == (f"site A does not have the file {FILE}",)
-    assert said(A=replace(one, precision=0.1)) == (
+    assert said(B=commitment) == (f"site A does not have the file {FILE}",)
+    assert said(A=replace(commitment, precision=0.1)) == (
         "the preregistration at site B differs from the one at the first site, which is used here",
     )
-    assert said(A=one) == ()
+    assert said(A=commitment) == ()
 
 
 @pytest.mark.parametrize("is_revealed", [True, False])
@@ -189,21 +189,23 @@ def test_each_row_of_a_site_is_in_the_pooled_tables_once(is_revealed: bool) -> N
     assert pooled.doubts == ("North", "South")
 
 
-def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(opened: Path, tmp_path: Path) -> None:
-    merge_sites(_copied(opened, tmp_path), tmp_path / "pooled")
+def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(opened_pool: Path, tmp_path: Path) -> None:
+    merge_sites(_copied(opened_pool, tmp_path), tmp_path / "pooled")
     exclude(tmp_path / "pooled/sites/B", "P001", 1, by="AK", reason="coughed")
     withdraw(tmp_path / "pooled/sites/A", "P002", by="AK", reason="asked")
-    found = load_study(tmp_path / "pooled")
-    assert found.people == ("A-P001", "A-P003", "B-P002", "B-P003")
-    assert [row.participant for row in found.exclusions] == ["B-P001"]
-    assert [(it.participant, it.by, it.reason) for it in found.withdrawn] == [("P002", "AK", "asked")]
+    study = load_study(tmp_path / "pooled")
+    assert study.people == ("A-P001", "A-P003", "B-P002", "B-P003")
+    assert [row.participant for row in study.exclusions] == ["B-P001"]
+    assert [(withdrawal.participant, withdrawal.by, withdrawal.reason) for withdrawal in study.withdrawn] == [
+        ("P002", "AK", "asked")
+    ]
     for person in ("P001", "P003"):
         withdraw(tmp_path / "pooled/sites/A", person, by="AK", reason="asked")
     assert load_study(tmp_path / "pooled").people == ("B-P002", "B-P003")
 
 
 @pytest.mark.nightly
-def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) -> None:
+def test_a_merged_study_with_levels_is_reported_before_and_after_unblinding(tmp_path: Path) -> None:
     (tmp_path / "adaptive.toml").write_text(
         text_of_damper("adaptive", ADAPTIVE, (4, 8)), encoding="utf-8", newline="\n"
     )
@@ -214,16 +216,23 @@ def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) 
         for seed, site in enumerate("AB", start=1)
     }
     merge_sites(folders, tmp_path / "pooled")
-    sealed = load_study(tmp_path / "pooled")
-    assert {one.code[:2] for block in sealed.levels for one in block.settings} == {"A-", "B-"}
+    blinded = load_study(tmp_path / "pooled")
+    assert {setting.code[:2] for block in blinded.levels for setting in block.settings} == {"A-", "B-"}
     report(tmp_path / "pooled", tmp_path / "sealed", failed=pytest.fail)
     unblind_folder(tmp_path / "pooled", "AK", "closed")
-    found = load_study(tmp_path / "pooled")
-    for block in found.levels:
-        own = [next(one for one in load_study(path).levels if one.id == block.id) for path in site_folders(tmp_path)]
-        assert [one.condition for one in block.settings] == [one.condition for one in own[0].settings]
-        assert {one.condition for one in own[1].settings} == {one.condition for one in own[0].settings}
-    assert set(found.intervals["participant"]) == {"A-P001", "A-P002", "B-P001", "B-P002"}
+    unblinded = load_study(tmp_path / "pooled")
+    for block in unblinded.levels:
+        site_blocks = [
+            next(level_block for level_block in load_study(path).levels if level_block.id == block.id)
+            for path in site_folders(tmp_path)
+        ]
+        assert [setting.condition for setting in block.settings] == [
+            setting.condition for setting in site_blocks[0].settings
+        ]
+        assert {setting.condition for setting in site_blocks[1].settings} == {
+            setting.condition for setting in site_blocks[0].settings
+        }
+    assert set(unblinded.intervals["participant"]) == {"A-P001", "A-P002", "B-P001", "B-P002"}
     report(tmp_path / "pooled", tmp_path / "opened", failed=pytest.fail)
     assert "The results from these sites are merged: A (two participants) and B (two participants)" in read(
         tmp_path / "opened"

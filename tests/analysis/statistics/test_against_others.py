@@ -59,8 +59,8 @@ def test_statsmodels() -> None:
         values[:, 1], values[:, 0], -1.0, 1.0
     )
     equal = tost(values[:, 1] - values[:, 0], 1.0)
-    found = (equal.p, equal.t_lower, equal.p_lower, equal.t_upper, equal.p_upper)
-    assert found == pytest.approx((p, t_lower, p_lower, t_upper, p_upper))
+    numbers = (equal.p, equal.t_lower, equal.p_lower, equal.t_upper, equal.p_upper)
+    assert numbers == pytest.approx((p, t_lower, p_lower, t_upper, p_upper))
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -86,12 +86,12 @@ def test_two_settings_are_students_and_several_hotellings() -> None:
     assert slope_test(values[:, ::-1]).p == pytest.approx(slope_test(values).p)  # whichever setting is the first
 
 
-def test_people_with_slopes_of_their_own_are_no_trend() -> None:
-    """A model with random intercepts alone finds one in half of such studies."""
+def test_individual_slopes_without_a_common_slope_are_not_a_trend() -> None:
+    """A model with only random intercepts finds a trend in half of such studies."""
     draw, delays = np.random.default_rng(3), np.arange(7.0)
     own = draw.normal(size=(2000, 12, 1)) * delays + draw.normal(size=(2000, 12, 7))
-    shown = [(one.p or 1.0) <= 0.05 for one in (slope_test(study, delays[:, None]) for study in own)]
-    assert sum(shown) <= binom.ppf(0.999, 2000, 0.05)
+    are_shown = [(result.p or 1.0) <= 0.05 for result in (slope_test(study, delays[:, None]) for study in own)]
+    assert sum(are_shown) <= binom.ppf(0.999, 2000, 0.05)
 
 
 def test_the_trend_is_scipys() -> None:
@@ -116,13 +116,13 @@ def test_mean_variance_and_interval_are_those_of_statsmodels(spread):
     draw = np.random.default_rng(5)
     variances = draw.uniform(0.01, 0.2, 9)
     estimates = 1.3 + draw.normal(0, np.sqrt(variances + spread))
-    found = group_mean(estimates, variances)
-    counted = np.sqrt(variances * np.median(variances))
-    theirs = meta.combine_effects(estimates, counted, method_re="iterated", use_t=True)
-    assert found.between == pytest.approx(max(theirs.tau2, 0.0), abs=1e-6)
-    assert found.mean == pytest.approx(theirs.mean_effect_re, abs=1e-6)
+    mean = group_mean(estimates, variances)
+    weights = np.sqrt(variances * np.median(variances))
+    theirs = meta.combine_effects(estimates, weights, method_re="iterated", use_t=True)
+    assert mean.between == pytest.approx(max(theirs.tau2, 0.0), abs=1e-6)
+    assert mean.mean == pytest.approx(theirs.mean_effect_re, abs=1e-6)
     low, high = theirs.conf_int()[3]  # random effects, Hartung–Knapp
-    assert (found.low, found.high) == pytest.approx((low, high), abs=1e-5)
+    assert (mean.low, mean.high) == pytest.approx((low, high), abs=1e-5)
 
 
 @pytest.mark.parametrize(("people", "shared"), [(3, 0.0), (5, 0.0), (5, 0.02), (10, 0.0), (20, 0.0), (20, 0.02)])
@@ -132,18 +132,18 @@ def test_intervals_cover_the_mean(people, shared):
         variances = draw.uniform(0.02, 0.1, people)
         common = draw.normal(0, np.sqrt(shared))
         half = 1.959964 * math.sqrt(shared)
-        found = group_mean(draw.normal(common, np.sqrt(variances + 0.05)), variances, (half, half))
-        assert found.low is not None
-        assert found.high is not None
-        covered += found.low <= 0 <= found.high
+        mean = group_mean(draw.normal(common, np.sqrt(variances + 0.05)), variances, (half, half))
+        assert mean.low is not None
+        assert mean.high is not None
+        covered += mean.low <= 0 <= mean.high
     assert covered / 1000 == pytest.approx(0.95, abs=0.025)
 
 
 def test_estimates_that_seem_precise_because_they_are_too_high_move_the_mean_little():
     """As those of wide functions; weights of 1/variance give 0.071, and intervals that hold in 86 %."""
-    draw, found = np.random.default_rng(3), []
+    draw, means = np.random.default_rng(3), []
     for _ in range(600):
         errors = draw.normal(0.0, 0.25, 10)
-        found.append(group_mean(errors, 0.25**2 * np.exp(-0.4 * errors / 0.25)))
-    assert 0.0 < np.mean([one.mean for one in found]) < 0.05
-    assert np.mean([(one.low or 0.0) <= 0.0 <= (one.high or 0.0) for one in found]) > 0.92
+        means.append(group_mean(errors, 0.25**2 * np.exp(-0.4 * errors / 0.25)))
+    assert 0.0 < np.mean([mean.mean for mean in means]) < 0.05
+    assert np.mean([(mean.low or 0.0) <= 0.0 <= (mean.high or 0.0) for mean in means]) > 0.92

@@ -15,10 +15,10 @@ from tests.analysis.oracle.cumulative import fitted
 DELAYS = np.array([[0.0], [0.4], [0.8], [1.2], [1.6], [2.0], [2.4]])
 
 
-def drawn(
+def random_answers(
     seed: int, *, people: int = 14, effect: float = 0.0, slope_sd: float = 0.0, k: int = 7
 ) -> NDArray[np.float64]:
-    """Return two answers of each participant under each of the first ``k`` delays, of people who differ."""
+    """Return two answers of each participant at each of the first ``k`` delays; participants differ."""
     rng = np.random.default_rng(seed)
     slopes = effect + slope_sd * rng.normal(size=(people, 1))
     at = 1.2 * rng.normal(size=(people, 1)) + slopes * DELAYS[:k, 0]
@@ -50,7 +50,7 @@ def test_published_estimates_of_the_wine_data() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "over_delay"), [(471, True), (472, False)])
 def test_the_model_is_the_maximum_of_an_independent_likelihood(seed: int, over_delay: bool) -> None:
-    values = drawn(seed, effect=0.7, slope_sd=0.6, k=7 if over_delay else 3)
+    values = random_answers(seed, effect=0.7, slope_sd=0.6, k=7 if over_delay else 3)
     values[2, 1:], values[5] = np.nan, np.nan
     design = DELAYS if over_delay else np.eye(3)[:, 1:]
     model = cumulative_model(values, DELAYS if over_delay else None, "increasing" if over_delay else None)
@@ -63,7 +63,7 @@ def test_the_model_is_the_maximum_of_an_independent_likelihood(seed: int, over_d
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1011, 1066])
-def test_a_search_does_not_end_at_a_standard_deviation_of_0_that_is_no_maximum(seed: int) -> None:
+def test_the_search_does_not_stop_at_a_zero_standard_deviation_below_the_maximum(seed: int) -> None:
     rng = np.random.default_rng(seed)
     levels = np.arange(5.0)[:, None]
     own = 4 + 0.5 * rng.normal(size=(12, 1, 1)) + 0.1 * rng.normal(size=(12, 1, 1)) * levels
@@ -74,7 +74,7 @@ def test_a_search_does_not_end_at_a_standard_deviation_of_0_that_is_no_maximum(s
 
 
 def test_sides_are_those_of_the_signed_root() -> None:
-    values = drawn(81, effect=0.5, people=10)
+    values = random_answers(81, effect=0.5, people=10)
     two, rising, falling = (cumulative_model(values, DELAYS, side) for side in (None, "increasing", "decreasing"))
     assert rising.p == pytest.approx(stats.t.sf(math.sqrt(rising.statistic or 0.0), 9))
     assert rising.p + falling.p == pytest.approx(1.0)
@@ -83,15 +83,15 @@ def test_sides_are_those_of_the_signed_root() -> None:
 
 
 def test_the_order_of_two_conditions_does_not_matter() -> None:
-    values = drawn(17, effect=1.5, slope_sd=2.0, k=3)[:, [0, 2], :1]
+    values = random_answers(17, effect=1.5, slope_sd=2.0, k=3)[:, [0, 2], :1]
     first, swapped = cumulative_model(values), cumulative_model(values[:, ::-1])
     assert first.p == pytest.approx(swapped.p, rel=1e-3)
     assert first.effect == pytest.approx(-swapped.log_odds_ratios[0], abs=1e-3)
     assert len(first.sds) == 1
 
 
-def test_what_has_no_model_says_why() -> None:
-    few, same = cumulative_model(drawn(1, people=7), DELAYS), cumulative_model(np.full((9, 7, 1), 4.0), DELAYS)
+def test_a_missing_model_has_a_note_with_the_reason() -> None:
+    few, same = cumulative_model(random_answers(1, people=7), DELAYS), cumulative_model(np.full((9, 7, 1), 4.0), DELAYS)
     apart = cumulative_model(np.broadcast_to([[[2.0], [6.0]]], (12, 2, 1)))
     assert "fewer than 8 participants" in few.note
     assert "gave the same answer" in same.note
@@ -108,13 +108,16 @@ def test_what_has_no_model_says_why() -> None:
 @pytest.mark.nightly
 @pytest.mark.parametrize("people", [8, 24])
 @pytest.mark.parametrize("slope_sd", [0.0, 0.8])
-def test_studies_without_an_effect_are_seldom_significant(people: int, slope_sd: float) -> None:
-    ps = [cumulative_model(drawn(seed, people=people, slope_sd=slope_sd), DELAYS).p for seed in range(9_000, 9_300)]
+def test_studies_without_an_effect_are_rarely_significant(people: int, slope_sd: float) -> None:
+    ps = [
+        cumulative_model(random_answers(seed, people=people, slope_sd=slope_sd), DELAYS).p
+        for seed in range(9_000, 9_300)
+    ]
     assert sum(p is not None and p <= 0.05 for p in ps) <= stats.binom.isf(1e-3, 300, 0.06)
 
 
 @pytest.mark.nightly
-def test_medians_of_people_with_effects_of_their_own_are_seldom_significant() -> None:
+def test_individual_effects_without_a_common_effect_are_rarely_significant() -> None:
     """Three conditions whose effects differ between participants (SD 1.2) but not on average."""
     ps = []
     for seed in range(500, 800):

@@ -22,18 +22,18 @@ SLEEP_2 = np.array([1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4])
 
 def test_d_of_a_published_example() -> None:
     """Student's sleep data, in the documentation of the R package effectsize: d = −1.28 [−2.12, −0.41]."""
-    found = d_z(SLEEP - SLEEP_2)
-    assert found is not None
-    assert [round(one, 2) for one in (found.value, found.low, found.high)] == [-1.28, -2.12, -0.41]
+    effect = d_z(SLEEP - SLEEP_2)
+    assert effect is not None
+    assert [round(number, 2) for number in (effect.value, effect.low, effect.high)] == [-1.28, -2.12, -0.41]
     assert d_z(np.ones(5)) is None
 
 
 def test_g_of_two_groups_is_the_corrected_difference() -> None:
-    found = hedges_g(np.array([1.0, 2.0, 3.0]), np.array([3.0, 4.0, 5.0]))
-    assert found is not None
+    effect = hedges_g(np.array([1.0, 2.0, 3.0]), np.array([3.0, 4.0, 5.0]))
+    assert effect is not None
     # Mean difference −2, pooled SD 1, four degrees of freedom: J = Γ(2) / (√2 Γ(1.5)).
-    assert found.value == pytest.approx(-2 / (math.sqrt(2) * math.gamma(1.5)))
-    assert found.low < found.value < found.high
+    assert effect.value == pytest.approx(-2 / (math.sqrt(2) * math.gamma(1.5)))
+    assert effect.low < effect.value < effect.high
 
 
 @pytest.mark.parametrize(
@@ -47,9 +47,9 @@ def test_bayes_factors_are_those_published(t: float, sizes: tuple[int, ...], fac
 
 def test_delta_is_counted() -> None:
     first, second = np.array([1.0, 2.0, 5.0, 7.0]), np.array([2.0, 3.0])
-    found = cliffs_delta(first, second)
-    assert found is not None
-    assert found.value == (4 - 3) / 8  # 5 and 7 are above both; 1 below both, 2 below one and equal to the other
+    effect = cliffs_delta(first, second)
+    assert effect is not None
+    assert effect.value == (4 - 3) / 8  # 5 and 7 are above both; 1 below both, 2 below one and equal to the other
     paired = paired_delta(np.array([1.0, 2.0, 0.0, -1.0]))
     assert paired is not None
     assert paired.value == 1 / 4
@@ -60,17 +60,20 @@ def test_delta_is_counted() -> None:
     assert paired_delta(np.zeros(12)) is None
 
 
-def test_a_bayes_factor_beyond_what_a_float_holds_is_the_largest_one() -> None:
+def test_a_bayes_factor_that_overflows_is_the_largest_float() -> None:
     assert jzs_bayes_factor(1e8, 60) == jzs_bayes_factor(60.0, 2000) == math.exp(LARGEST_LOG)
 
 
 def test_intervals_hold_as_often_as_they_claim() -> None:
     """The true delta of normal groups is 2 Φ(d / √2) − 1, that of paired differences 2 Φ(d) − 1."""
     draw, studies, d = np.random.default_rng(7), 400, 0.8
-    held = np.zeros(4)
+    times_covered = np.zeros(4)
     for _ in range(studies):
         first, second = draw.normal(d, 1, 15), draw.normal(0, 1, 15)
         intervals = (d_z(first), hedges_g(first, second), cliffs_delta(first, second), paired_delta(first))
         true = (d, d, 2 * norm.cdf(d / math.sqrt(2)) - 1, 2 * norm.cdf(d) - 1)
-        held += [one is not None and one.low <= value <= one.high for one, value in zip(intervals, true, strict=True)]
-    assert (held / studies >= 0.92).all(), held / studies
+        times_covered += [
+            interval is not None and interval.low <= value <= interval.high
+            for interval, value in zip(intervals, true, strict=True)
+        ]
+    assert (times_covered / studies >= 0.92).all(), times_covered / studies

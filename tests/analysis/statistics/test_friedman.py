@@ -29,9 +29,9 @@ def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> Non
     def squares(chosen: tuple[tuple[int, ...], ...]) -> float:
         return float(((np.sum(chosen, axis=0) - len(rows) * 4) ** 2).sum())
 
-    found = squares(tuple(map(tuple, ranks)))
-    every = [squares(chosen) for chosen in product(*(list(permutations(row)) for row in ranks))]
-    assert result.p == pytest.approx(np.mean([value >= found for value in every]))
+    sums = squares(tuple(map(tuple, ranks)))
+    every = [squares(rearranged) for rearranged in product(*(list(permutations(row)) for row in ranks))]
+    assert result.p == pytest.approx(np.mean([value >= sums for value in every]))
     assert result.smallest_p == pytest.approx(np.mean([value == max(every) for value in every]))
 
 
@@ -39,16 +39,16 @@ def test_a_drawn_p_is_repeatable_and_near_the_exact_one(monkeypatch: pytest.Monk
     exact = friedman(SCORES)
     module.friedman_distribution.cache_clear()
     monkeypatch.setattr(module, "WORK", 0)
-    drawn = friedman(SCORES[:, ::-1], seed=3)
-    assert drawn == friedman(SCORES[:, ::-1], seed=3)
+    random_result = friedman(SCORES[:, ::-1], seed=3)
+    assert random_result == friedman(SCORES[:, ::-1], seed=3)
     module.friedman_distribution.cache_clear()
-    assert drawn.method == "Monte Carlo permutation, 9999 draws, seed 3"
+    assert random_result.method == "Monte Carlo permutation, 9999 draws, seed 3"
     # As extreme counts: three who agree are one of 36, the most extreme there is.
     assert friedman([[1, 4, 7]] * 3).p == pytest.approx(1 / 36, abs=0.008)
     module.friedman_distribution.cache_clear()
     assert exact.p is not None
-    assert drawn.p is not None
-    assert abs(drawn.p - exact.p) < 5 * np.sqrt(exact.p / 9999) + 1e-4
+    assert random_result.p is not None
+    assert abs(random_result.p - exact.p) < 5 * np.sqrt(exact.p / 9999) + 1e-4
 
 
 @pytest.mark.slow
@@ -74,10 +74,10 @@ def test_the_exact_p_is_that_of_relabelling_whole_participants() -> None:
     orders = list(permutations(range(3)))
 
     def statistic(chosen: tuple[tuple[int, ...], ...]) -> float:
-        moved = np.stack([values[:, person][:, list(order)] for person, order in enumerate(chosen)], axis=1)
-        return float(sum(friedmanchisquare(*item.T).statistic for item in moved))
+        relabelled = np.stack([values[:, person][:, list(order)] for person, order in enumerate(chosen)], axis=1)
+        return float(sum(friedmanchisquare(*item.T).statistic for item in relabelled))
 
-    every = np.array([statistic(chosen) for chosen in product(orders, repeat=4)])
+    every = np.array([statistic(relabelling) for relabelling in product(orders, repeat=4)])
     result = global_permutation(values)
     assert result.method == "exact permutation"
     assert result.statistic == pytest.approx(every[0])

@@ -70,7 +70,7 @@ def numbers(value: object) -> Iterator[float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("test", TESTS)
 @pytest.mark.parametrize("table", TABLES)
-def test_every_result_holds_what_it_promises(test: str, table: str) -> None:
+def test_every_result_is_consistent(test: str, table: str) -> None:
     result = TESTS[test](TABLES[table])
     assert all(math.isfinite(number) for number in numbers(result))
     assert result.n + result.dropped == len(TABLES[table])
@@ -83,8 +83,8 @@ def test_every_result_holds_what_it_promises(test: str, table: str) -> None:
     if result.interval is not None:
         assert result.interval.low <= result.interval.high
         assert result.effect is None or result.interval.low <= result.effect <= result.interval.high
-    said = " ".join(str(part) for part in dataclasses.astuple(result))
-    assert "no effect" not in said
+    message = " ".join(str(part) for part in dataclasses.astuple(result))
+    assert "no effect" not in message
 
 
 def test_the_interval_of_a_mean_is_that_of_t_and_needs_values_that_differ() -> None:
@@ -116,9 +116,9 @@ def hits_of(n: int, total: int) -> list[int]:
 
 
 def matching(hits: list[int]) -> Recognition:
-    """Return the test of people who gave three names out once each, with so many ``hits``."""
+    """Return the test of people who used each of three names once, with these ``hits``."""
     names = {3: [0, 1, 2], 1: [0, 2, 1], 0: [1, 2, 0]}
-    return recognition([names[one] for one in hits], [0, 1, 2], 3)
+    return recognition([names[hit_count] for hit_count in hits], [0, 1, 2], 3)
 
 
 def test_the_name_is_the_single_highest_rating() -> None:
@@ -155,7 +155,7 @@ def test_the_exact_p_is_that_of_all_exchanges_of_answered_settings(names: list[l
         there = [place for place in range(3) if row[place] != UNANSWERED]
         orders = permutations([row[place] for place in there])
         each.append([sum(truth[p] == name for p, name in zip(there, order, strict=True)) for order in orders])
-    every = np.array([sum(chosen) for chosen in product(*each)])
+    every = np.array([sum(exchanged) for exchanged in product(*each)])
     result = recognition(names, truth, 4)
     if result.n == 0:
         assert result.p is None

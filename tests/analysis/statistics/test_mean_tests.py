@@ -51,19 +51,19 @@ def test_weighted_means_are_those_of_the_random_effects_model() -> None:
 
 
 def test_two_groups_have_the_degrees_of_freedom_of_the_smaller_one() -> None:
-    one, other = np.array([[1.0, 4.0, 2.5]]), np.array([[0.0, 1.0, 0.5, 0.25, 0.75]])
-    t = (one.mean() - other.mean()) / math.sqrt(one.var(ddof=1) / 3 + other.var(ddof=1) / 5)
-    found = means_of(one) - means_of(other, group=1)
-    assert found.t()[0] == pytest.approx(t)
-    assert p_differs(found, "greater")[0][0] == pytest.approx(student.sf(t, 2))
-    assert p_differs(found, "less")[0][0] == pytest.approx(student.cdf(t, 2))
+    first, second = np.array([[1.0, 4.0, 2.5]]), np.array([[0.0, 1.0, 0.5, 0.25, 0.75]])
+    t = (first.mean() - second.mean()) / math.sqrt(first.var(ddof=1) / 3 + second.var(ddof=1) / 5)
+    difference = means_of(first) - means_of(second, group=1)
+    assert difference.t()[0] == pytest.approx(t)
+    assert p_differs(difference, "greater")[0][0] == pytest.approx(student.sf(t, 2))
+    assert p_differs(difference, "less")[0][0] == pytest.approx(student.cdf(t, 2))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [8, 12, 20, 30])
 @pytest.mark.parametrize("opposite", [1.0, -1.0])
-def test_skewed_differences_of_mean_zero_are_seldom_shown(n: int, opposite: float) -> None:
-    """One in six is 5 points higher, all others one lower. Of 8 all are often equal, so that there is no test."""
+def test_skewed_differences_of_mean_zero_are_rarely_significant(n: int, opposite: float) -> None:
+    """One in six is 5 points higher, the others one lower; samples of 8 are often equal and then not tested."""
     values = opposite * np.where(np.random.default_rng(n).random((STUDIES, n)) < 1 / 6, 5.0, -1.0)
     values = values[np.ptp(values, axis=1) > 0]
     assert false_rate(means_of(values)) <= AT_MOST
@@ -71,7 +71,7 @@ def test_skewed_differences_of_mean_zero_are_seldom_shown(n: int, opposite: floa
 
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [8, 12, 20, 30])
-def test_exponential_differences_of_mean_zero_are_seldom_shown(n: int) -> None:
+def test_exponential_differences_of_mean_zero_are_rarely_significant(n: int) -> None:
     values = np.random.default_rng([n, 7]).exponential(size=(STUDIES, n)) - 1
     assert false_rate(means_of(values)) <= AT_MOST
 
@@ -79,17 +79,15 @@ def test_exponential_differences_of_mean_zero_are_seldom_shown(n: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("n", "other"), [(2, 6), (3, 5), (4, 8), (8, 4), (10, 20), (6, 6)])
 @pytest.mark.parametrize("ratio", [1, 3, 6])
-def test_groups_that_differ_in_spread_and_size_are_seldom_called_different(n: int, other: int, ratio: float) -> None:
+def test_groups_that_differ_only_in_spread_and_size_are_rarely_significant(n: int, other: int, ratio: float) -> None:
     rng = np.random.default_rng([n, other, int(ratio)])
-    one, two = ratio * rng.normal(size=(STUDIES, n)), rng.normal(size=(STUDIES, other))
-    assert false_rate(means_of(one) - means_of(two, group=1)) <= AT_MOST
+    first, second = ratio * rng.normal(size=(STUDIES, n)), rng.normal(size=(STUDIES, other))
+    assert false_rate(means_of(first) - means_of(second, group=1)) <= AT_MOST
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("n", "shift", "least"), [(8, 1.5, 0.84), (12, 0.8, 0.6), (20, 0.8, 0.88)])
-def test_a_difference_of_normal_answers_is_found_nearly_as_often_as_by_t_alone(
-    n: int, shift: float, least: float
-) -> None:
+def test_the_power_for_normal_answers_is_close_to_that_of_the_t_test(n: int, shift: float, least: float) -> None:
     values = np.random.default_rng(n).normal(shift, 1.0, (STUDIES, n))
     by_t: Callable[[float], float] = lambda alpha: float((ttest_1samp(values, 0, axis=1).pvalue <= alpha).mean())  # noqa: E731
     assert least <= false_rate(means_of(values)) <= by_t(0.05)

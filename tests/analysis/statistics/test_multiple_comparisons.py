@@ -10,7 +10,7 @@ from study_app.errors import AnalysisError
 
 
 @pytest.mark.parametrize("p", [-0.1, 1.1, float("nan")])
-def test_what_is_no_p_is_refused(p: float) -> None:
+def test_values_that_are_not_p_values_are_refused(p: float) -> None:
     with pytest.raises(AnalysisError, match="cannot be adjusted"):
         holm([p, 0.5])
     with pytest.raises(AnalysisError, match="cannot be adjusted"):
@@ -42,7 +42,7 @@ def row_of(levels: list[float], people: int) -> pd.Series:
     return measures.aggregate(frame, {"L1": people}, ["L1"], ["a"]).iloc[0]
 
 
-def test_a_setting_that_was_not_presented_has_no_missing_answers() -> None:
+def test_a_setting_that_was_not_presented_counts_as_zero_missing_answers() -> None:
     answers = pd.DataFrame(
         {
             "participant": ["P1", "P2", "P2", "P3"],
@@ -53,8 +53,8 @@ def test_a_setting_that_was_not_presented_has_no_missing_answers() -> None:
         }
     )
     table = measures.aggregate(answers, {"L1": 7}, ["L2", "L1"], ["b", "a"], {"L1": 4})
-    counted = ["code", "item", "participants", "presented", "presented_excluded", "n", "cannot_judge", "missing"]
-    assert table[counted].to_numpy().tolist() == [
+    columns = ["code", "item", "participants", "presented", "presented_excluded", "n", "cannot_judge", "missing"]
+    assert table[columns].to_numpy().tolist() == [
         ["L2", "b", 0, 0, 0, 0, 0, 0],
         ["L2", "a", 0, 0, 0, 0, 0, 0],
         ["L1", "b", 1, 7, 4, 1, 0, 6],

@@ -19,10 +19,12 @@ PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text(e
 def test_published_result(case: dict[str, Any]) -> None:
     module, name = case["function"].split(".")
     function = getattr(import_module(f"study_app.analysis.statistics.{module}"), name)
-    result = function(*(PUBLISHED["tables"][one] if isinstance(one, str) else one for one in case["given"]))
+    result = function(
+        *(PUBLISHED["tables"][argument] if isinstance(argument, str) else argument for argument in case["given"])
+    )
     for part, expected in case["expected"].items():
-        found = attrgetter(part)(result) if part else result
-        assert found == (expected if isinstance(expected, str) else pytest.approx(expected, rel=case.get("rel", 1e-9)))
+        value = attrgetter(part)(result) if part else result
+        assert value == (expected if isinstance(expected, str) else pytest.approx(expected, rel=case.get("rel", 1e-9)))
 
 
 SMALLEST = {
@@ -57,5 +59,5 @@ def test_the_smallest_p_of_so_many_people_who_agree(test: str, n: int) -> None:
         ([0.0, 1.0, 0.0, -1.0] * 4 + [0.0], "equivalent"),  # of one in six some are in it: (5 / 6)**17 < 0.05
     ],
 )
-def test_equivalence_needs_enough_people_and_no_spread(differences: list[float], verdict: str) -> None:
+def test_equivalence_needs_enough_people_or_equal_differences(differences: list[float], verdict: str) -> None:
     assert tost(differences, 1.0).verdict == verdict

@@ -29,8 +29,10 @@ LEVELS = (0.0, 50.0, 100.0, 200.0)
 def answers(people: int, columns: int, seed: int, slope: float = 0.0, missing: float = 0.0) -> Any:
     """Return answers from 1 to 7 that rise with the column."""
     rng = np.random.default_rng(seed)
-    found = np.clip(np.round(rng.normal(4 + slope * (np.arange(columns) - columns / 2), 1.2, (people, columns))), 1, 7)
-    return np.where(rng.random(found.shape) < missing, NAN, found)
+    ratings = np.clip(
+        np.round(rng.normal(4 + slope * (np.arange(columns) - columns / 2), 1.2, (people, columns))), 1, 7
+    )
+    return np.where(rng.random(ratings.shape) < missing, NAN, ratings)
 
 
 SAMPLES = {
@@ -52,26 +54,26 @@ PS = ((), (0.04,), (0.01, 0.04, None), (0.5, 0.02, 0.02, 1.0), (None, None), (0.
 
 def over(function: Callable[..., Any], cases: dict[str, Any], *more: Any, **named: Any) -> Iterator[tuple[str, Any]]:
     for name, case in cases.items():
-        yield f"{function.__name__}({name}{''.join(f', {one}' for one in (*more, *named.items()))})", case
+        yield f"{function.__name__}({name}{''.join(f', {argument}' for argument in (*more, *named.items()))})", case
 
 
 def results(function: Callable[..., Any], cases: dict[str, Any], *more: Any, **named: Any) -> Iterator[str]:
-    """Yield the words of what a function returns, or the error that it raises, for each case; check its numbers."""
+    """Yield the texts of each result, or the error, of a function for each case; check its numbers."""
     for name, case in over(function, cases, *more, **named):
-        given = case if isinstance(case, tuple) else (case,)
+        arguments = case if isinstance(case, tuple) else (case,)
         try:
-            found = function(*given, *more, **named)
-            check(name, found)
+            result = function(*arguments, *more, **named)
+            check(name, result)
         except (AnalysisError, ValueError) as error:
             yield f"{function.__name__}: {type(error).__name__}: {error}"
             continue
         for key in ("method", "note", "no_interval"):
-            if words := getattr(found, key, ""):
+            if words := getattr(result, key, ""):
                 yield f"{function.__name__}: {key}: {words}"
 
 
 def check(name: str, found: Any) -> None:
-    """Check what holds for every result: p is a probability, an interval holds its effect, no test has a reason."""
+    """Check that p is a probability, that an interval contains its effect and that a missing test has a note."""
     p, effect = getattr(found, "p", None), getattr(found, "effect", None)
     low, high = getattr(found, "low", None), getattr(found, "high", None)
     if p is not None and np.ndim(p) == 0 and not np.isnan(p):
@@ -98,15 +100,15 @@ def of_settings() -> Iterator[str]:
     yield from results(trend_tests.trend, SAMPLES)
     yield from results(trend_tests.trend, SAMPLES, "decreasing")
     yield from results(trend_tests.trend, {"long": answers(210, 3, 2, 0.1)}, seed=None)
-    wide = {name: (one, LEVELS[: one.shape[1]]) for name, one in SAMPLES.items() if one.shape[1] <= 4}
+    wide = {name: (sample, LEVELS[: sample.shape[1]]) for name, sample in SAMPLES.items() if sample.shape[1] <= 4}
     yield from results(trend_tests.step_down, wide)
     yield from results(trend_tests.step_down, wide, "decreasing", alpha=0.2)
-    stacked = {name: np.stack([one, one[::-1], 8 - one]) for name, one in SAMPLES.items() if name != "half"}
+    stacked = {name: np.stack([sample, sample[::-1], 8 - sample]) for name, sample in SAMPLES.items() if name != "half"}
     yield from results(rank_tests.global_permutation, stacked, draws=300)
 
 
 def of_pairs() -> Iterator[str]:
-    pairs = {name: (one[:, 0], one[:, -1]) for name, one in SAMPLES.items()}
+    pairs = {name: (sample[:, 0], sample[:, -1]) for name, sample in SAMPLES.items()}
     yield from results(rank_tests.signed_rank_test, pairs)
     yield from results(rank_tests.signed_rank_test, {"few": pairs["few"]}, alpha=0.2)
     yield from results(rank_tests.signed_rank_test, {"lengths": ([1.0], [1.0, 2.0])})
@@ -115,35 +117,37 @@ def of_pairs() -> Iterator[str]:
     tables = {"2": [[5, 1], [2, 7]], "0": [[0, 0], [0, 0]], "3": [[3, 0, 1], [0, 4, 0], [2, 0, 5]]}
     yield from results(recognition_tests.kappa, tables)
     yield from results(recognition_tests.named_labels, named_(1, 3))
-    names = {name: (recognition_tests.named_labels(one), (0, 1, None)) for name, one in named_(2, 3).items()}
+    names = {name: (recognition_tests.named_labels(choices), (0, 1, None)) for name, choices in named_(2, 3).items()}
     yield from results(recognition_tests.recognition, names, labels=4)
-    yield from results(outcome.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()})
+    yield from results(
+        outcome.student_interval, {name: np.asarray(differences, float) for name, differences in DIFFERENCES.items()}
+    )
     yield from results(thresholds.group_mean, {
         "one": ([1.0], [0.1]), "two": ([1.0, 2.0], [0.1, 0.2]), "alike": ([1.0, 1.01, 0.99], [0.5, 0.4, 0.6]),
         "apart": ([1.0, 4.0, 9.0, 2.0], [0.01, 0.02, 0.01, 0.03]), "none": ([], []),
     })  # fmt: skip
     yield from results(outcome.draws_for, {f"{a} {m}": (a, 1000, m) for a, m in product((0.05, 0.001, 1e-6), (1, 40))})
     yield from results(outcome.clopper_pearson, {f"{c} of {n}": (c, n) for c, n in ((0, 5), (5, 5), (3, 10), (0, 1))})
-    complete = {name: one for name, one in SAMPLES.items() if not np.isnan(one).any()}
+    complete = {name: sample for name, sample in SAMPLES.items() if not np.isnan(sample).any()}
     yield from results(rank_tests.doubled_ranks, complete)
 
 
 def of_equivalence() -> Iterator[str]:
-    cases = {name: np.asarray(one, float) for name, one in DIFFERENCES.items()}
+    cases = {name: np.asarray(differences, float) for name, differences in DIFFERENCES.items()}
     for bound, alpha in ((1.0, 0.05), (0.5, 0.05), (3.0, 0.2)):
         yield from results(equivalence.tost, cases, bound, alpha=alpha)
     cases_of_bounds = product((0.2, 0.05, 0.01), (0.5, 1.0, 3.0))
     limits = {f"{alpha} {bound}": (alpha, bound, equivalence.STEPS) for alpha, bound in cases_of_bounds}
     yield from results(fewest_participants, limits)
     yield from results(mean_tests.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
-    rows = {name: one[None] for name, one in cases.items() if len(one) > 2 and not np.isnan(one).any()}
+    rows = {name: sample[None] for name, sample in cases.items() if len(sample) > 2 and not np.isnan(sample).any()}
     yield from results(simulated_studies.difference_ranks, rows)
     yield from results(equivalence.shows_equivalence, rows, 1.0, 0.05)
 
 
 def of_thresholds() -> Iterator[str]:
     rising = {
-        name: (one, LEVELS[: one.shape[1]]) for name, one in SAMPLES.items()
+        name: (sample, LEVELS[: sample.shape[1]]) for name, sample in SAMPLES.items()
         if name in ("none", "one", "ties", "few", "rise", "fall", "missing", "all missing", "ends", "one setting")
     }  # fmt: skip
     yield from results(thresholds.detection_threshold, rising)
@@ -153,7 +157,7 @@ def of_thresholds() -> Iterator[str]:
         yield from results(thresholds.p_of_fit, {str(right): (right, [10] * 3, expected)})
     flags = ([True] * 4, [True, False, False, False], [False, True, True, True], [True])
     shares = ([0.9, 0.6, 0.7, 0.8], [0.7] * 4)
-    drifting = {f"{given} {own}": (given, own[: len(given)]) for given, own in product(flags, shares)}
+    drifting = {f"{flag} {own}": (flag, own[: len(flag)]) for flag, own in product(flags, shares)}
     yield from results(thresholds.drift, drifting)
 
 

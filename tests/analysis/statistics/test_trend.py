@@ -28,7 +28,7 @@ def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> Non
     ranks = trend_tests.doubled_ranks(np.array(rows, dtype=float))
     sums = [sum(place * rank for place, rank in enumerate(row, start=1)) for row in ranks]
     each = [[sum(p * r for p, r in enumerate(order, start=1)) for order in permutations(row)] for row in ranks]
-    every = np.array([sum(chosen) for chosen in product(*each)])
+    every = np.array([sum(rearranged) for rearranged in product(*each)])
     assert result.statistic == sum(sums) / 2
     assert result.p_page == pytest.approx((every >= sum(sums)).mean())
     away = np.array([2 * total - 4 * 25 for total in sums]) / 2
@@ -36,19 +36,19 @@ def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> Non
     assert result.p == pytest.approx((flipped >= away.sum()).mean())
 
 
-def test_people_with_trends_of_their_own_around_zero_show_no_trend_of_all() -> None:
+def test_individual_trends_around_zero_are_not_a_common_trend() -> None:
     """Page's null hypothesis is that nobody has a trend; the test decides about the population."""
     rng = np.random.default_rng(3)
-    shown = dict.fromkeys(("trend", "page"), 0)
+    times_shown = dict.fromkeys(("trend", "page"), 0)
     for _ in range(300):
         slopes = rng.normal(size=(12, 1)) * np.linspace(-2.5, 2.5, 7)
-        found = trend(np.rint(4 + slopes + rng.normal(size=(12, 7))), seed=None)
-        assert found.p is not None
-        assert found.p_page is not None
-        shown["trend"] += found.p <= 0.05
-        shown["page"] += found.p_page <= 0.05
-    assert shown["trend"] <= binom.ppf(0.999, 300, 0.05)
-    assert shown["page"] > binom.ppf(0.999, 300, 0.10)
+        result = trend(np.rint(4 + slopes + rng.normal(size=(12, 7))), seed=None)
+        assert result.p is not None
+        assert result.p_page is not None
+        times_shown["trend"] += result.p <= 0.05
+        times_shown["page"] += result.p_page <= 0.05
+    assert times_shown["trend"] <= binom.ppf(0.999, 300, 0.05)
+    assert times_shown["page"] > binom.ppf(0.999, 300, 0.10)
 
 
 def test_the_effect_is_the_mean_rank_correlation() -> None:
@@ -59,7 +59,7 @@ def test_the_effect_is_the_mean_rank_correlation() -> None:
     assert trend([[1, 2, 3]] * 12).no_interval == "no interval: all participants have the same correlation"
 
 
-def test_ties_lower_the_effect_and_its_name_says_so() -> None:
+def test_ties_lower_the_effect_and_change_its_name() -> None:
     answers = [[1, 1, 2, 4], [2, 3, 3, 3], [1, 2, 5, 4]]
     result = trend(answers)
     # Sums of (rank - 2.5) (place - 2.5): 4.5, 3 and 4, of at most 5.
@@ -104,10 +104,10 @@ def test_step_down_stops_at_the_first_failure_even_if_a_later_one_would_do() -> 
     assert "this is not evidence that there is none" in result.note
 
 
-def test_the_step_down_hardly_ever_finds_a_delay_where_there_is_none() -> None:
+def test_the_step_down_test_rarely_finds_a_delay_without_a_trend() -> None:
     rng = np.random.default_rng(7)
-    found = [step_down(rng.integers(1, 8, (5, 7)), DELAYS).lowest_ms is not None for _ in range(300)]
-    assert np.mean(found) <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / 300)
+    are_found = [step_down(rng.integers(1, 8, (5, 7)), DELAYS).lowest_ms is not None for _ in range(300)]
+    assert np.mean(are_found) <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / 300)
 
 
 def test_bad_delays_and_a_single_setting_are_refused() -> None:

@@ -14,6 +14,6 @@ def by_condition(condition: str, item: str) -> Answer:
 
 
 def refusal(folder: Path) -> str:
-    with pytest.raises(AnalysisError) as caught:
+    with pytest.raises(AnalysisError) as error:
         load_study(folder)
-    return str(caught.value)
+    return str(error.value)

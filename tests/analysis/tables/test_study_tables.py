@@ -34,7 +34,7 @@ def cell(study: Study, code: str, item: str) -> dict:
 SWAPPED = {'"L"': '"X"', '"D"': '"L"', '"X"': '"D"'}
 
 
-def test_what_a_block_compares_is_told_by_its_receipt_and_not_by_the_letter_of_its_codes(tmp_path: Path) -> None:
+def test_the_kind_of_a_block_comes_from_the_receipt_and_not_from_the_code_prefix(tmp_path: Path) -> None:
     text = source_bytes("rek2024").decode()
     for old, new in SWAPPED.items():
         text = text.replace(f"code_prefix = {old}", f"code_prefix = {new}")
@@ -45,24 +45,24 @@ def test_what_a_block_compares_is_told_by_its_receipt_and_not_by_the_letter_of_i
         ("L1", "delays"),
     ]
     results.open()
-    found = load_study(results.folder)
-    assert [block.kind for block in found.blocks] == ["liquids", "delays"]
-    assert [found.blocks_of(block.kind) for block in found.blocks] == [(block,) for block in found.blocks]
+    study = load_study(results.folder)
+    assert [block.kind for block in study.blocks] == ["liquids", "delays"]
+    assert [study.blocks_of(block.kind) for block in study.blocks] == [(block,) for block in study.blocks]
 
 
-def test_receipts_of_earlier_versions_do_not_say_what_a_block_compares(rek: Results) -> None:
+def test_the_kind_of_a_block_is_derived_for_receipts_of_earlier_versions(rek: Results) -> None:
     path = rek.add("P001", by_condition).receipt
-    told = json.loads(path.read_bytes())
-    for block in told["protocol"]["blocks"].values():
+    receipt_table = json.loads(path.read_bytes())
+    for block in receipt_table["protocol"]["blocks"].values():
         del block["compares"]
-    path.write_text(json.dumps(told), encoding="utf-8", newline="\n")
+    path.write_text(json.dumps(receipt_table), encoding="utf-8", newline="\n")
     assert [block.kind for block in load_study(rek.folder).blocks] == ["liquids", "delays"]
     rek.open()
     assert [block.kind for block in load_study(rek.folder).blocks] == ["liquids", "delays"]
 
 
 def test_a_repeat_that_was_never_answered_leaves_the_answer_missing(rek: Results) -> None:
-    """The operator discarded the first attempt; its answers must not come back because the second has none."""
+    """The answers of a discarded first attempt do not count if the second attempt has none."""
     rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
     path = rek.responses("P001")
     lines = path.read_text("utf-8").splitlines(keepends=True)
@@ -88,15 +88,15 @@ def test_sessions_that_were_not_completed_are_kept_and_do_not_count(rek: Results
 @pytest.mark.parametrize("name", ["simulated", "pilot"])
 def test_one_simulated_or_pilot_session_makes_the_study_one(name: str) -> None:
     settings = made_up.liquids(2)
-    found = made_up.study(settings, list(made_up.everybody(settings, 2, lambda *_: 4)))
-    participants = found.participants.assign(**{name: [False, True]})
-    assert getattr(replace(found, participants=participants), name)
-    assert not getattr(replace(found, participants=participants[:1]), name)
+    case_study = made_up.study(settings, list(made_up.everybody(settings, 2, lambda *_: 4)))
+    participants = case_study.participants.assign(**{name: [False, True]})
+    assert getattr(replace(case_study, participants=participants), name)
+    assert not getattr(replace(case_study, participants=participants[:1]), name)
 
 
 def test_an_excluded_trial_takes_all_its_attempts_and_is_one_presentation(rek: Results) -> None:
     rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
-    (trial,) = {int(one) for one in load_study(rek.folder).trials.query("code == 'L2'")["trial"]}
+    (trial,) = {int(number) for number in load_study(rek.folder).trials.query("code == 'L2'")["trial"]}
     rek.exclude("P001", trial=trial)
     study = load_study(rek.folder)
     row = cell(study, "L2", "immersive")
@@ -104,7 +104,7 @@ def test_an_excluded_trial_takes_all_its_attempts_and_is_one_presentation(rek: R
     assert list(study.trials.query("code == 'L2'")["excluded"]) == [True, True]
 
 
-def test_an_unfinished_session_that_is_excluded_is_told_once(rek: Results) -> None:
+def test_an_excluded_unfinished_session_is_listed_once(rek: Results) -> None:
     rek.add("P001", lambda *_: 6)
     rek.add("P002", lambda *_: 1, status="withdrawn", trials=4)
     rek.exclude("P002")
@@ -112,7 +112,7 @@ def test_an_unfinished_session_that_is_excluded_is_told_once(rek: Results) -> No
     assert (study.left_out, len(study.excluded_sessions)) == (0, 1)
 
 
-def test_reasons_of_session_and_trial_stand_beside_each_other_and_none_excludes_too(rek: Results) -> None:
+def test_reasons_of_session_and_trial_are_joined_and_an_empty_reason_excludes(rek: Results) -> None:
     rek.add("P001", lambda *_: 6)
     rek.exclude("P001", trial=3, reason="spilled tea")
     rek.exclude("P001", reason="tired")
@@ -131,7 +131,7 @@ def test_reasons_of_session_and_trial_stand_beside_each_other_and_none_excludes_
         ({"participant": "P001", "trial": 99}, "participant P001, session 1, trial 99, which does not exist"),
     ],
 )
-def test_excluding_what_is_not_there_is_refused(rek: Results, excluded: dict, says: str) -> None:
+def test_an_exclusion_without_its_session_or_trial_is_refused(rek: Results, excluded: dict, says: str) -> None:
     rek.add("P001", lambda *_: 6)
     rek.exclude(**excluded)
     message = refusal(rek.folder)
@@ -197,12 +197,12 @@ def test_a_changed_table_is_refused_with_file_row_and_value(real: Results, old: 
     message = refusal(real.folder)
     assert says in message
     assert str(path) in message
-    found = re.search(r"(row \d+), column (\w+: '.*?' is .*?);", message)
-    if found:  # `verify` refuses the same cell in the same row
-        assert list(table_problems(path.read_bytes(), RESPONSES)) == [", ".join(found.groups())]
+    match = re.search(r"(row \d+), column (\w+: '.*?' is .*?);", message)
+    if match:  # `verify` refuses the same cell in the same row
+        assert list(table_problems(path.read_bytes(), RESPONSES)) == [", ".join(match.groups())]
 
 
-def test_quotes_change_nothing(real: Results) -> None:
+def test_quotes_do_not_change_the_values(real: Results) -> None:
     real.add("P001", by_condition)
     path, before = real.responses("P001"), load_study(real.folder).responses
     with path.open(encoding="utf-8", newline="") as file:
@@ -256,9 +256,9 @@ def test_an_opened_key_that_was_changed_is_refused(rek: Results) -> None:
 
 def test_groups_are_counted_by_participant_in_the_order_of_their_names() -> None:
     settings = made_up.liquids(2)
-    found = made_up.study(settings, list(made_up.everybody(settings, 6, lambda *_: 4, sessions=2)))
+    case_study = made_up.study(settings, list(made_up.everybody(settings, 6, lambda *_: 4, sessions=2)))
     groups = pd.array([name for name in ("mid", "zeta", "alpha", "zeta", "mid", "zeta") for _ in range(2)], "string")
-    study = replace(found, participants=found.participants.assign(group=groups))
+    study = replace(case_study, participants=case_study.participants.assign(group=groups))
     assert list(group_counts(study).items()) == [("alpha", 1), ("mid", 2), ("zeta", 3)]
 
 

@@ -20,17 +20,17 @@ def prices() -> Prices:
 
 @pytest.fixture
 def make_lab(qtbot: Any, prices: Prices) -> Iterator[Callable[..., LabController]]:
-    """Make a lab that was not entered yet, with a hand that moves by itself."""
-    made: list[LabController] = []
+    """Return a function that makes a lab that is not entered yet, with a scripted hand."""
+    labs: list[LabController] = []
 
-    def make(**given: Any) -> LabController:
+    def make(**options: Any) -> LabController:
         place = LabPlace()
         place.resize(1300, 800)
-        made.append(LabController(place, **({"device": "scripted", "make_appraiser": lambda: prices} | given)))
-        return made[-1]
+        labs.append(LabController(place, **({"device": "scripted", "make_appraiser": lambda: prices} | options)))
+        return labs[-1]
 
     yield make
-    for lab in made:
+    for lab in labs:
         lab.end(PATIENCE)
         lab.place.close()
         lab.place.deleteLater()
@@ -43,8 +43,8 @@ def visit(make_lab: Callable[..., LabController]) -> LabController:
 
 
 @pytest.fixture
-def felt(visit: LabController, qtbot: Any) -> LabController:
-    """The lab entered, honey in the hand, going in circles: a force for as long as nobody stops it."""
+def running_lab(visit: LabController, qtbot: Any) -> LabController:
+    """Return an entered lab that presents honey along circles, so that a force acts until it is stopped."""
     visit.bench = visit.bench.choose("A", "Honey", load_scene("rek2024", "honey"))
     visit.place.show()
     qtbot.waitUntil(lambda: visit.live is not None, timeout=OPENS_MS)

@@ -1,4 +1,4 @@
-"""The liquid lab with its real page, servo and device: felt, blinded, and never left with a force on."""
+"""The liquid lab with its real page, servo and device: presented, blinded, and never left with a force."""
 
 import subprocess
 import sys
@@ -20,94 +20,96 @@ pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
 
 
 def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(
-    felt: LabController, prices: Prices, qtbot: Any
+    running_lab: LabController, prices: Prices, qtbot: Any
 ) -> None:
-    live = felt.live
+    live = running_lab.live
     assert live is not None
-    assert sys.excepthook == felt.uncaught.handle_exception
-    qtbot.waitUntil(lambda: bool(prices.asked), timeout=SOON_MS)
-    view = felt.view()
+    assert sys.excepthook == running_lab.uncaught.handle_exception
+    qtbot.waitUntil(lambda: bool(prices.requests), timeout=SOON_MS)
+    view = running_lab.view()
     assert (view.busy, view.trouble, view.force_on, view.path) == ("", "", True, "circle")
     assert view.trace is not None
     assert view.now is not None
     assert live.shadow.differing == 0
-    felt.place.hide()
+    running_lab.place.hide()
     assert is_let_go(live)
-    assert felt.live is None
+    assert running_lab.live is None
     assert prices.closed
-    assert sys.excepthook != felt.uncaught.handle_exception
-    assert not felt.frames.isActive()
-    felt.place.show()
-    qtbot.waitUntil(lambda: felt.live is not None and felt.live.trace() is not None, timeout=OPENS_MS)
-    assert felt.view().workbench.a.name == "Honey"
+    assert sys.excepthook != running_lab.uncaught.handle_exception
+    assert not running_lab.frames.isActive()
+    running_lab.place.show()
+    qtbot.waitUntil(lambda: running_lab.live is not None and running_lab.live.trace() is not None, timeout=OPENS_MS)
+    assert running_lab.view().workbench.a.name == "Honey"
 
 
-def test_closing_the_window_ends_in_zero_force(felt: LabController) -> None:
-    live = felt.live
-    felt.place.close()
+def test_closing_the_window_ends_in_zero_force(running_lab: LabController) -> None:
+    live = running_lab.live
+    running_lab.place.close()
     assert is_let_go(live)
 
 
-def test_an_exception_in_a_slot_ends_in_zero_force_and_words(felt: LabController, qtbot: Any, caplog: Any) -> None:
-    live = felt.live
+def test_an_exception_in_a_slot_ends_in_zero_force_and_words(
+    running_lab: LabController, qtbot: Any, caplog: Any
+) -> None:
+    live = running_lab.live
     assert live is not None
 
     def broken() -> None:
         raise RuntimeError("out of ideas")
 
     live.poll = broken  # type: ignore[method-assign]
-    qtbot.waitUntil(lambda: felt.live is None, timeout=SOON_MS)
+    qtbot.waitUntil(lambda: running_lab.live is None, timeout=SOON_MS)
     assert is_let_go(live)
-    view = felt.view()
+    view = running_lab.view()
     assert view.trouble == "RuntimeError: out of ideas; the force is off"
     assert not view.force_on
     assert view.may_fade_in
     caplog.clear()  # it is written down once, with its trace
-    felt.place.ask("fade in")
-    qtbot.waitUntil(lambda: felt.live is not None, timeout=OPENS_MS)
-    assert felt.view().trouble == ""
+    running_lab.place.ask("fade in")
+    qtbot.waitUntil(lambda: running_lab.live is not None, timeout=OPENS_MS)
+    assert running_lab.view().trouble == ""
 
 
 def test_a_painter_that_an_exception_leaves_at_work_is_ended(
-    felt: LabController, qtbot: Any, caplog: Any, monkeypatch: Any
+    running_lab: LabController, qtbot: Any, caplog: Any, monkeypatch: Any
 ) -> None:
-    """Else Qt paints no window any more: what failed could not even be read."""
+    """Otherwise Qt paints no window any more, and the error could not be read."""
     window = QMainWindow()  # Qt paints it without a detour through Python, as it does the operator's
-    window.setCentralWidget(felt.place)
+    window.setCentralWidget(running_lab.place)
     window.show()
-    qtbot.waitUntil(lambda: felt.live is not None, timeout=OPENS_MS)
-    live, left, told = felt.live, [], []
-    felt.uncaught.previous = lambda kind, error, trace: told.append((kind, error, trace))
+    qtbot.waitUntil(lambda: running_lab.live is not None, timeout=OPENS_MS)
+    live, painters, exceptions = running_lab.live, [], []
+    running_lab.uncaught.previous = lambda kind, error, trace: exceptions.append((kind, error, trace))
 
     def broken(painter: Any, *_arguments: Any, **_named: Any) -> None:
-        left.append(weakref.ref(painter))
+        painters.append(weakref.ref(painter))
         raise RuntimeError("in a paint event")
 
     with monkeypatch.context() as patched:
         patched.setattr("study_app.gui.lab.lab_tank.sprites.draw_sprite", broken)
-        qtbot.waitUntil(lambda: bool(told), timeout=SOON_MS)
+        qtbot.waitUntil(lambda: bool(exceptions), timeout=SOON_MS)
     assert is_let_go(live)
-    assert told[0][0] is RuntimeError
-    assert [painter() for painter in left] == [None] * len(left)
+    assert exceptions[0][0] is RuntimeError
+    assert [painter() for painter in painters] == [None] * len(painters)
     caplog.clear()
-    felt.uncaught.previous = sys.__excepthook__
-    felt.place.setParent(None)
+    running_lab.uncaught.previous = sys.__excepthook__
+    running_lab.place.setParent(None)
     window.close()
 
 
-def test_a_lost_device_is_told_and_can_be_opened_again(felt: LabController, qtbot: Any) -> None:
-    live = felt.live
+def test_a_lost_device_is_reported_and_can_be_reopened(running_lab: LabController, qtbot: Any) -> None:
+    live = running_lab.live
     assert live is not None
     live.device.unplug()  # type: ignore[attr-defined]
-    qtbot.waitUntil(lambda: "stopped responding" in felt.view().trouble, timeout=SOON_MS)
-    assert not felt.view().force_on
-    felt.place.ask("diagnose")
-    assert (felt.live, is_let_go(live)) == (None, True), "the diagnosis needs the device"
-    assert felt.view().device.state == "stopped"
-    assert "stopped responding" in felt.view().trouble
-    felt.place.ask("fade in")
-    qtbot.waitUntil(lambda: felt.live is not None and felt.live is not live, timeout=OPENS_MS)
-    assert felt.view().trouble == ""
+    qtbot.waitUntil(lambda: "stopped responding" in running_lab.view().trouble, timeout=SOON_MS)
+    assert not running_lab.view().force_on
+    running_lab.place.ask("diagnose")
+    assert (running_lab.live, is_let_go(live)) == (None, True), "the diagnosis needs the device"
+    assert running_lab.view().device.state == "stopped"
+    assert "stopped responding" in running_lab.view().trouble
+    running_lab.place.ask("fade in")
+    qtbot.waitUntil(lambda: running_lab.live is not None and running_lab.live is not live, timeout=OPENS_MS)
+    assert running_lab.view().trouble == ""
 
 
 NEVER_ANSWERS = """
@@ -134,30 +136,30 @@ def test_a_preset_for_a_drive_that_never_answers_does_not_keep_the_program_from_
     assert (ended.returncode, ended.stdout) == (0, "ends\n"), ended.stderr
 
 
-def test_while_blind_nothing_tells_one_from_the_other(felt: LabController, qtbot: Any, tmp_path: Path) -> None:
-    """Though nothing is exchanged, what is felt begins anew: a hand that felt no fade would know."""
-    felt.chance = Stays()
-    small = felt.bench.change("body.diameter_m", 0.02)
-    felt.feel_workbench(small)
-    assert felt.live is not None
-    assert felt.view().body_radius_m == pytest.approx(0.001)
-    qtbot.waitUntil(lambda: felt.live.due_in_s is None, timeout=SOON_MS)
-    before = felt.live.servo.serial  # the scene that was asked for last, though no tick may have taken it yet
-    felt.place.ask("blind", True)
-    qtbot.waitUntil(lambda: felt.live.servo.telemetry.latest().scene > before, timeout=SOON_MS)
-    view = felt.view()
+def test_while_blind_nothing_tells_one_from_the_other(running_lab: LabController, qtbot: Any, tmp_path: Path) -> None:
+    """The force fades in again even without an exchange; otherwise the hand would notice the difference."""
+    running_lab.chance = Stays()
+    small = running_lab.bench.change("body.diameter_m", 0.02)
+    running_lab.feel_workbench(small)
+    assert running_lab.live is not None
+    assert running_lab.view().body_radius_m == pytest.approx(0.001)
+    qtbot.waitUntil(lambda: running_lab.live.due_in_s is None, timeout=SOON_MS)
+    before = running_lab.live.servo.serial  # the scene that was asked for last, though no tick may have taken it yet
+    running_lab.place.ask("blind", True)
+    qtbot.waitUntil(lambda: running_lab.live.servo.telemetry.latest().scene > before, timeout=SOON_MS)
+    view = running_lab.view()
     assert view.workbench.blind
     assert view.felt == "A"
     assert view.body_radius_m == pytest.approx(0.0034)
-    felt.place.ask("switch")
-    felt.place.ask("save", tmp_path / "told.toml", felt.bench.a)
-    assert "blind" in felt.view().trouble
+    running_lab.place.ask("switch")
+    running_lab.place.ask("save", tmp_path / "told.toml", running_lab.bench.a)
+    assert "blind" in running_lab.view().trouble
     assert not list(tmp_path.iterdir())
-    felt.place.ask("blind", False)
-    assert not felt.view().workbench.blind
+    running_lab.place.ask("blind", False)
+    assert not running_lab.view().workbench.blind
 
 
-def test_no_price_is_no_reason_to_stop(make_lab: Callable[..., LabController], qtbot: Any) -> None:
+def test_a_missing_cost_measurement_does_not_stop_the_lab(make_lab: Callable[..., LabController], qtbot: Any) -> None:
     def nobody() -> Prices:
         raise OSError("no more processes")
 

@@ -1,4 +1,4 @@
-"""Devices opened behind the lab's page: one at a time, cancelled, refused, let go of."""
+"""Devices opened for the lab: one at a time, cancelled, refused, released."""
 
 import threading
 from collections.abc import Callable
@@ -29,16 +29,16 @@ def test_two_devices_are_never_opened_at_a_time_and_one_that_cannot_be_closed_ho
     devices = Devices()
     opening = LabOpening(devices)
     failed: list[str] = []
-    opened: list[Any] = []
+    rigs: list[Any] = []
     opening.failed.connect(lambda error: failed.append(str(error)))
-    opening.opened.connect(opened.append)
+    opening.opened.connect(rigs.append)
     opening.request_device("falcon")
-    qtbot.waitUntil(lambda: devices.asked == ["falcon"], timeout=SOON_MS)
+    qtbot.waitUntil(lambda: devices.requests == ["falcon"], timeout=SOON_MS)
     opening.request_device("spacemouse")
     opening.request_device("mouse")
     devices.gate.set()
-    qtbot.waitUntil(lambda: bool(opened), timeout=SOON_MS)
-    assert devices.asked == ["falcon", "mouse"]
+    qtbot.waitUntil(lambda: bool(rigs), timeout=SOON_MS)
+    assert devices.requests == ["falcon", "mouse"]
     assert (devices.most, devices.open, devices.closed) == (1, 1, 1)
     assert failed == (["the servo is stuck: switch it off"] if stuck else [])
 
@@ -47,7 +47,7 @@ def test_leaving_while_a_device_is_being_opened_lets_go_of_it(make_lab: MakeLab,
     devices = SlowDevices()
     visit = make_lab(open_live=devices)
     visit.place.show()
-    qtbot.waitUntil(lambda: devices.asked == ["scripted"], timeout=SOON_MS)
+    qtbot.waitUntil(lambda: devices.requests == ["scripted"], timeout=SOON_MS)
     qtbot.waitUntil(lambda: visit.view().busy == "switch scripted on", timeout=SOON_MS)
     visit.place.hide()
     threading.Timer(0.05, devices.gate.set).start()
@@ -62,7 +62,7 @@ def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_open
     devices = SlowDevices()
     visit = make_lab(open_live=devices)
     visit.place.show()
-    qtbot.waitUntil(lambda: devices.asked == ["scripted"], timeout=SOON_MS)
+    qtbot.waitUntil(lambda: devices.requests == ["scripted"], timeout=SOON_MS)
     visit.place.ask("stop")
     devices.gate.set()
     qtbot.waitUntil(lambda: devices.closed == 1, timeout=SOON_MS)

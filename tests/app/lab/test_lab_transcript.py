@@ -1,4 +1,4 @@
-"""All that the lab does at each signal of its place, with a servo that only records what it is asked.
+"""All actions of the lab at each signal of its page, with a servo that only records calls.
 
 People change ``lab.txt``; no option regenerates it.
 """
@@ -24,19 +24,19 @@ from tests.golden_values import changed, value_lines
 
 
 class Recorded:
-    """A device's servo and an appraiser: each call is kept in ``done``."""
+    """A device's servo and an appraiser that record each call in ``done``."""
 
-    def __init__(self, done: list[str]) -> None:
-        self.done = done
+    def __init__(self, events: list[str]) -> None:
+        self.done = events
         self.device = SimpleNamespace(workspace_m=(0.05, 0.03, 0.02))
         self.servo = SimpleNamespace(fault=None)
         self.path: str | None = None
         self.due_in_s: float | None = None
-        self.force_on, self.works, self.told, self.orders = True, True, list[Any](), 0
+        self.force_on, self.works, self.pending_answers, self.orders = True, True, list[Any](), 0
 
     def __getattr__(self, name: str) -> Any:
         def called(*values: Any, **named: Any) -> None:
-            self.done.append(" ".join([name, *map(short, values), *(f"{key}={one}" for key, one in named.items())]))
+            self.done.append(" ".join([name, *map(short, values), *(f"{key}={value}" for key, value in named.items())]))
             if name in ("stop_force", "fade_in"):
                 self.force_on = name == "fade_in"
             if name == "play":
@@ -66,12 +66,12 @@ class Recorded:
         return self.orders
 
     def answers(self) -> list[Any]:
-        told, self.told = self.told, []
-        return told
+        answers, self.pending_answers = self.pending_answers, []
+        return answers
 
 
 def short(value: Any) -> str:
-    """Return what tells a workbench, a setting or a scene from another."""
+    """Return a short text that identifies a workbench, a setting or a scene."""
     if hasattr(value, "in_hand"):
         first = f", blind of {value.first}" if value.blind else ""
         return f"{value.presented}: {value.a.name} {short(value.a.scene)}, {value.b.name} {short(value.b.scene)}{first}"
@@ -126,7 +126,7 @@ STEPS: dict[str, Any] = {
     "copy": ask("copy"),
     "costs are asked": lambda lab, *_: lab._cost_due.timeout.emit(),
     "old costs": lets(told=[(0, COSTS)]),
-    "costs": lambda lab, live, _: live.told.extend([(live.orders, COSTS), (live.orders, ERRORS)]),
+    "costs": lambda lab, live, _: live.pending_answers.extend([(live.orders, COSTS), (live.orders, ERRORS)]),
     "costs again": lambda lab, *_: lab._cost_due.timeout.emit(),
     "appraiser died": lets(works=False, told=[(3, Crashed(-9))]),
     "path": ask("path", "circle"),
@@ -172,20 +172,20 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any)
     at_hand = "study_app.app.lab_controller.available_liquids"
     monkeypatch.setattr(at_hand, lambda saved: (Choice(source=saved[-1], liquid="new", title="New"),))
     (tmp_path / "broken.toml").write_text("format = 2", encoding="utf-8", newline="\n")
-    done: list[str] = []
-    lives = [Recorded(done)]
+    events: list[str] = []
+    lives = [Recorded(events)]
 
     def open_live(name: str, *, progress: Any, cancelled: Any) -> Recorded:
         progress(f"open {name}")
-        done.append(f"open {name} {cancelled()}")
+        events.append(f"open {name} {cancelled()}")
         if name == "falcon":
             raise DeviceNotFound("none is plugged in")
-        lives.append(Recorded(done))
+        lives.append(Recorded(events))
         return lives[-1]
 
     place = LabPlace()
     qtbot.addWidget(place)
-    place.message.connect(lambda *words: done.append(f"message {words}"))
+    place.message.connect(lambda *words: events.append(f"message {words}"))
     honey, syrup = (Choice(source="rek2024", liquid=name, title=name.title()) for name in ("honey", "syrup"))
     lab = LabController(
         place, device="scripted", open_live=open_live, chance=random.Random(1), make_appraiser=lambda: lives[0],  # noqa: S311
@@ -195,7 +195,7 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any)
     lab.frames.setInterval(10**8)
     lines, before = [], list[str]()
     for name, step in STEPS.items():
-        done.clear()
+        events.clear()
         caplog.clear()
         live = lives[0] if name in ("old costs", "costs", "appraiser died") else lives[-1]
         step(lab, live, tmp_path)
@@ -204,12 +204,18 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any)
         timers = [lab.frames.isActive(), lab._due.isActive(), lab._cost_due.isActive()]
         lab._draw_frame()
         view = lab.view()
-        shown = value_lines(
+        view_lines = value_lines(
             replace(view, liquids=(), paths=(), workbench=None, device=replace(view.device, choices=())), "view"
         )
-        found = (line.replace(repr(str(tmp_path))[1:-1], "FOLDER").replace(str(tmp_path), "FOLDER") for line in shown)
-        after = [f"timers: {timers}", f"bench: {short(lab.bench)}", *found]
-        lines += [f"== {name}", *done, *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records)]
+        stable_text = (
+            line.replace(repr(str(tmp_path))[1:-1], "FOLDER").replace(str(tmp_path), "FOLDER") for line in view_lines
+        )
+        after = [f"timers: {timers}", f"bench: {short(lab.bench)}", *stable_text]
+        lines += [
+            f"== {name}",
+            *events,
+            *(f"log {record.levelname} {record.getMessage()}" for record in caplog.records),
+        ]
         lines += changed(before, after)
         before = after
         if name == "path":
@@ -219,8 +225,8 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any)
     lab.end(PATIENCE)
     caplog.clear()
     lines += [*map(str, sorted(path.name for path in tmp_path.iterdir()))]
-    found = (line.replace(repr(str(tmp_path))[1:-1], "FOLDER").replace(str(tmp_path), "FOLDER") for line in lines)
-    check_kept(Path(__file__).with_name("lab.txt"), what_comes(found))
+    stable_text = (line.replace(repr(str(tmp_path))[1:-1], "FOLDER").replace(str(tmp_path), "FOLDER") for line in lines)
+    check_kept(Path(__file__).with_name("lab.txt"), what_comes(stable_text))
 
 
 def test_the_parts_of_a_tick_are_listed_by_their_price_and_absent_ones_last() -> None:
@@ -260,9 +266,7 @@ def test_the_parts_of_a_tick_are_listed_by_their_price_and_absent_ones_last() ->
         ),
     ],
 )
-def test_the_errors_of_a_setting_are_stated_with_what_they_hold_for(
-    errors: Errors, values: list[str], note: str
-) -> None:
+def test_the_errors_of_a_setting_are_stated_with_their_scope(errors: Errors, values: list[str], note: str) -> None:
     rows = lab_controller._error_rows(errors)
     assert [row.value for row in rows] == values
     assert [(row.measure, row.note) for row in rows] == [

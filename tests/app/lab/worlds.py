@@ -1,4 +1,4 @@
-"""What the lab is given in tests: an appraiser and devices that answer when told to, and the force it sends."""
+"""Parts of the lab for tests: a controlled appraiser and devices, and the sent force."""
 
 import threading
 from types import SimpleNamespace
@@ -27,27 +27,27 @@ ERRORS = Errors(wake=2e-15, force_n=1e-12, lag_s=0.0095, left_out=())
 
 
 class Prices:
-    """Answers when told to."""
+    """An appraiser that answers when a test says so."""
 
     def __init__(self) -> None:
-        self.asked: list[Scene] = []
-        self.told: list[tuple[int, Any]] = []
+        self.requests: list[Scene] = []
+        self.pending_answers: list[tuple[int, Any]] = []
         self.works, self.closed = True, False
 
     def order(self, question: Question) -> int:
-        self.asked.append(question.scene)
-        return len(self.asked)
+        self.requests.append(question.scene)
+        return len(self.requests)
 
     def answers(self) -> list[tuple[int, Any]]:
-        told, self.told = self.told, []
-        return told
+        answers, self.pending_answers = self.pending_answers, []
+        return answers
 
     def close(self) -> None:
         self.closed = True
 
 
 class Stays:
-    """Draws that exchange nothing."""
+    """A random source whose draws exchange nothing."""
 
     def random(self) -> float:
         return 0.9
@@ -70,15 +70,15 @@ def is_let_go(live: Any) -> bool:
 
 
 class SlowDevices:
-    """Opens nothing before it is let."""
+    """A device source that waits for permission to open."""
 
     def __init__(self) -> None:
-        self.open, self.closed, self.asked = 0, 0, []
+        self.open, self.closed, self.requests = 0, 0, []
         self.most = 0
         self.gate = threading.Event()
 
     def __call__(self, name: str, *, progress: Any, cancelled: Any, **_: Any) -> Any:
-        self.asked.append(name)
+        self.requests.append(name)
         self.open += 1
         self.most = max(self.most, self.open)
         progress(f"switch {name} on")

@@ -1,4 +1,4 @@
-"""A bridge between two windows and a world that is told what to do."""
+"""A bridge between two windows and a controlled world."""
 
 import re
 import sys
@@ -12,7 +12,7 @@ from shiboken6 import isValid
 from study_app.protocol.load import load
 from study_app.protocol.source.files import source_bytes
 from study_app.session import start
-from tests.app.world import World, begun
+from tests.app.world import World, begin_bridge
 
 PATIENCE_MS = 150_000  # less than pytest's timeout
 
@@ -27,7 +27,9 @@ def make(qapp, world):
     def build(blinding="double", **parts):
         protocol = load("demo")
         protocol = protocol.model_copy(update={"study": protocol.study.model_copy(update={"blinding": blinding})})
-        made_bridges.append(begun(protocol, **({"servo": world, "journal": world, "clock": world.seconds} | parts)))
+        made_bridges.append(
+            begin_bridge(protocol, **({"servo": world, "journal": world, "clock": world.seconds} | parts))
+        )
         return made_bridges[-1]
 
     made_bridges = []
@@ -61,7 +63,7 @@ def nobody_stays():
 
 @pytest.fixture
 def quick_preflight(monkeypatch):
-    """Measure a tenth of a second: what is judged of it is tested by itself."""
+    """Shorten the measurement to a tenth of a second; its verdicts are tested separately."""
     monkeypatch.setattr(start, "MEASURED_S", 0.1)
 
 
@@ -70,8 +72,8 @@ def short_demo(tmp_path: Path) -> str:
     """Return the demo protocol with tasks of a second."""
     text = source_bytes("demo").decode()
     for key, value in (("min_s", "0.3"), ("count", "1"), ("dwell_s", "0.05")):
-        text, found = re.subn(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
-        assert found == 1
+        text, count = re.subn(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
+        assert count == 1
     path = tmp_path / "demo.toml"
     path.write_text(text, encoding="utf-8", newline="\n")
     return str(path)

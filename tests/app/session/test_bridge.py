@@ -1,4 +1,4 @@
-"""The two windows of a session: what they say reaches servo and journal; its stops, its ends, both on one screen."""
+"""The two windows of a session: their requests to servo and journal, stops, ends, and a shared screen."""
 
 import threading
 from types import SimpleNamespace
@@ -87,10 +87,10 @@ def test_a_participants_window_that_comes_to_cover_the_operators_pauses_the_sess
     QApplication.processEvents()
     assert (("paused", {"by": "program"}) in world.done) == full_screen
     assert isinstance(bridge.participant.page, PausePage if full_screen else TaskPage)
-    told = [one for one in bridge.operator.findChildren(Question) if one.isVisible()]
-    assert len(told) == full_screen
+    questions = [question for question in bridge.operator.findChildren(Question) if question.isVisible()]
+    assert len(questions) == full_screen
     if full_screen:
-        qtbot.waitUntil(lambda: QApplication.activeWindow() in (bridge.operator, *told))
+        qtbot.waitUntil(lambda: QApplication.activeWindow() in (bridge.operator, *questions))
         bridge.operator.ask("resume")
         assert not any(row[0] == "resumed" for row in world.done), "the participant's window would cover the force stop"
         returned = []
@@ -108,14 +108,14 @@ def test_a_screen_that_is_rescaled_in_a_trial_changes_neither_force_nor_place_of
     window.resize(1000, 700)
     world.samples = tick(world, 2.0)
     bridge.draw_frame()
-    large, done = window.tank.ball, len(world.done)
+    large, call_count = window.tank.ball, len(world.done)
     for part in (window, bridge.operator):
         QApplication.sendEvent(part, QEvent(QEvent.Type.DevicePixelRatioChange))
     window.resize(500, 350)
     world.samples = tick(world, 3.0)
     bridge.draw_frame()
     small = window.tank.ball
-    assert (world.done[done:], world.force_is_on, bridge.trouble) == ([], True, "")
+    assert (world.done[call_count:], world.force_is_on, bridge.trouble) == ([], True, "")
     assert window.tank.placer.place(tuple(window.tank.view.position_m)) == small != large
 
 
@@ -163,11 +163,11 @@ STALL_FACTS = ("trouble", "waits", "device_ready", "faults")
 def test_the_operators_view_has_each_fact_of_servo_recorder_and_outlets(
     make: Any, world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen: list[dict[str, Any]] = []
+    facts_shown: list[dict[str, Any]] = []
     view_session = bridge_module.view_session
 
     def view(session: Any, progress: Any, vitals: Any, **facts: Any) -> Any:
-        seen.append({"session": session, "progress": progress, **facts})
+        facts_shown.append({"session": session, "progress": progress, **facts})
         return view_session(session, progress, vitals, **facts)
 
     monkeypatch.setattr(bridge_module, "view_session", view)
@@ -176,7 +176,7 @@ def test_the_operators_view_has_each_fact_of_servo_recorder_and_outlets(
     bridge = make("single", recorder=recorder, outlets=outlets)
     world.now_s, world.rate_hz = 12.5, 500.0
     bridge.view()
-    assert seen[-1] == {
+    assert facts_shown[-1] == {
         "session": bridge.parts.session, "progress": bridge.parts.journal.progress, "now_s": 12.5,
         "force_on": world.force_is_on, "trouble": "", "waits": False, "device_ready": True, "faults": 0,
         "rate_hz": 500.0, "forces": bridge.forces.figures(), "lost": {3: "the disk is full"}, "dropped": 7,
@@ -185,19 +185,25 @@ def test_the_operators_view_has_each_fact_of_servo_recorder_and_outlets(
     world.fault, world.force_is_on = "the servo stopped", False
     for _ in range(2):
         bridge.view()
-    assert [seen[-1][name] for name in (*STALL_FACTS, "force_on")] == ["the servo stopped", False, False, 1, False]
+    assert [facts_shown[-1][name] for name in (*STALL_FACTS, "force_on")] == [
+        "the servo stopped",
+        False,
+        False,
+        1,
+        False,
+    ]
     with monkeypatch.context() as patch:
         patch.setattr(type(bridge.runner), "stalled", "the disk is full")
         world.fault = None
         bridge.view()
-        assert [seen[-1][name] for name in STALL_FACTS] == ["the disk is full", True, True, 1]
+        assert [facts_shown[-1][name] for name in STALL_FACTS] == ["the disk is full", True, True, 1]
         world.fault, bridge.trouble = "the servo stopped", "the window failed"
         bridge.view()
-        assert [seen[-1][name] for name in STALL_FACTS] == ["the window failed", False, False, 2]
+        assert [facts_shown[-1][name] for name in STALL_FACTS] == ["the window failed", False, False, 2]
     world.fault = None
     bridge.leave_without_asking()
     make().view()
-    assert [seen[-1][name] for name in ("forces", "lost", "dropped", "outlets_lost")] == [None, {}, 0, None]
+    assert [facts_shown[-1][name] for name in ("forces", "lost", "dropped", "outlets_lost")] == [None, {}, 0, None]
 
 
 def pushes(world: World, count: int = 400) -> Any:
@@ -215,11 +221,9 @@ def pushes(world: World, count: int = 400) -> Any:
     return samples
 
 
-def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_participant_the_same_in_both(
-    make: Any, world: World
-) -> None:
+def test_the_operator_sees_forces_only_in_a_single_blind_study(make: Any, world: World) -> None:
     names = ("Force relative to 6 N", "Limited ticks", "Force held back, limit 5\u2009%")
-    told, seen = {}, []
+    device_texts, participant_views = {}, []
     for blinding, limit_n in (("single", 6.0), ("double", None)):
         bridge = make(blinding=blinding, force_limit_n=limit_n)
         begin_trial(bridge, world)
@@ -228,7 +232,7 @@ def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_particip
         bridge.show_traces()
         bridge.show_tiles()
         rows, card = dict(bridge.view().device.rows), bridge.operator.force
-        told[bridge.operator.header.blind.word] = [rows[name] for name in names]
+        device_texts[bridge.operator.header.blind.word] = [rows[name] for name in names]
         if blinding == "single":
             x_n, size_n = (card.plot.curves[curve].getData()[1] for curve in (0, 3))
             assert x_n == pytest.approx(1.5)
@@ -239,11 +243,11 @@ def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_particip
             assert bridge.forces is None
         assert bridge.participant.widget.geometry().top() == 0, "without a strip"
         assert bridge.operator.header.page.isHidden()
-        seen.append((repr(bridge.participant.page), bridge.participant.grab().toImage()))
+        participant_views.append((repr(bridge.participant.page), bridge.participant.grab().toImage()))
         bridge.leave_without_asking()
         world.samples = records(SAMPLE, 0)
-    assert told == {
+    assert device_texts == {
         "Single-blind": ["50\u2009%, peak 50\u2009%", "force 7", "6.2\u2009%"],
         "Double-blind": ["hidden", "hidden", "hidden"],
     }
-    assert seen[0] == seen[1]
+    assert participant_views[0] == participant_views[1]

@@ -1,4 +1,4 @@
-"""All that a session's bridge does at each signal of its windows: asked of servo and journal, paged, shown."""
+"""All actions of a session's bridge at each signal of its windows: calls of servo and journal, pages, views."""
 
 import logging
 import re
@@ -29,7 +29,7 @@ GOLDEN = Path(__file__).parent / "golden"
 
 
 class Recorded(World):
-    """A world with a serial servo that may fault, whose calls of parts are kept too."""
+    """A world with a servo that may fault, which also records the calls of its parts."""
 
     tables_written = 0
 
@@ -45,7 +45,7 @@ class Recorded(World):
 
 
 def push(bridge: Any, world: World) -> None:
-    """Half a second of a force of 3 N, some limited."""
+    """Add half a second of samples with a force of 3 N, some limited."""
     count = 500
     samples = records(SAMPLE, count)
     world.now_s += count / 1000
@@ -155,13 +155,13 @@ PLAYS = {
 }
 
 
-def words_of(done: Any) -> str:
-    """Return a call, or a line with the values that a step gives it."""
-    if isinstance(done, str):
-        return done
-    name, values = done
-    told = [values[key] for key in TOLD if values.get(key)] if isinstance(values, dict) else values
-    return " ".join(map(str, (name, *told)))
+def words_of(call: Any) -> str:
+    """Return a call as text, or a line with its values."""
+    if isinstance(call, str):
+        return call
+    name, values = call
+    told_values = [values[key] for key in TOLD if values.get(key)] if isinstance(values, dict) else values
+    return " ".join(map(str, (name, *told_values)))
 
 
 TOLD = ("page", "trial", "attempt", "code", "by", "kind", "text", "reason", "what", "status", "device")
@@ -210,12 +210,12 @@ CALLS = {
 
 
 def view_words(view: Any) -> str:
-    """Return what the operator is told of device and disk."""
+    """Return the operator's information on device and disk."""
     faults = f"{dict(view.device.rows)['Safety faults']} faults"
-    told = {"waits": view.waits, "force on": view.force_on, "device ready": view.device.ready, faults: True,
+    conditions = {"waits": view.waits, "force on": view.force_on, "device ready": view.device.ready, faults: True,
             "may reconnect": view.may_reconnect, "reconnects": view.reconnects, view.reconnection: view.reconnection,
             f"trouble {view.trouble}": view.trouble}  # fmt: skip
-    return ", ".join([view.state, *(words for words, shown in told.items() if shown)])
+    return ", ".join([view.state, *(words for words, holds in conditions.items() if holds)])
 
 
 RUNS, OFF = "running, force on, device ready, {} faults", "force off, device ready, {} faults"
@@ -227,7 +227,7 @@ VIEWS = {
         ("servo stops", "trouble, force on, 1 faults, trouble the servo stopped: no samples"),
         ("wait", LOST.format(1, "", "the servo stopped: no samples")),
         ("device error", LOST.format(1, "", "no device is plugged in")),
-        ("reconnect", LOST.format(1, ", reconnects, Connecting the device …", "no device is plugged in")),
+        ("reconnect", LOST.format(1, ", reconnects, Connecting the device…", "no device is plugged in")),
         ("line", LOST.format(1, ", reconnects, press the button", "no device is plugged in")),
         ("not reconnected", LOST.format(1, ", reconnects, Not connected: still none.", "no device is plugged in")),
         ("reconnected", OFF.format(1)),
@@ -259,19 +259,19 @@ LOGGED = {
 """Where what the operator is told changes: the first ``wait`` is the beginning."""
 
 
-def paged(page: Any) -> list[str]:
-    """Return a page's kind and values but for the page that follows, which comes in its turn."""
+def page_summary(page: Any) -> list[str]:
+    """Return a page's kind and values, without the page that follows."""
     return list(value_lines(replace(page, coming=None) if getattr(page, "coming", None) else page, "page"))
 
 
 def calls_and_words(lines: list[str]) -> Iterator[str]:
-    """Yield every call, and of the views the words that are new, each once; numbers as #."""
-    seen = set[str]()
+    """Yield every call, and each new text of the views once; numbers as #."""
+    known_texts = set[str]()
     for line in lines:
         if not line.startswith("# "):
             yield masked(line)
-        elif (word := WORDS.match(line)) and (text := masked(word[1])) not in seen:
-            seen.add(text)
+        elif (word := WORDS.match(line)) and (text := masked(word[1])) not in known_texts:
+            known_texts.add(text)
             yield f"  {text}"
 
 
@@ -286,14 +286,14 @@ def test_a_place_is_the_newest_one_or_a_simulated_hands_aim() -> None:
 @pytest.mark.parametrize(("has_videos", "fault", "called"), [
     (False, None, ["rig"]), (False, "lost", ["rig"]), (True, None, ["videos"]), (True, "lost", ["rig", "videos"])
 ])  # fmt: skip
-def test_what_failed_is_reconnected(has_videos: bool, fault: str | None, called: list[str]) -> None:
-    done: list[str] = []
+def test_failed_devices_are_reconnected(has_videos: bool, fault: str | None, called: list[str]) -> None:
+    reconnected: list[str] = []
     rig: Any = SimpleNamespace(
-        servo=SimpleNamespace(fault=fault), reconnect=lambda: done.append("rig"), described={"name": "mouse"}
+        servo=SimpleNamespace(fault=fault), reconnect=lambda: reconnected.append("rig"), described={"name": "mouse"}
     )
-    videos: Any = SimpleNamespace(reopen=lambda: done.append("videos")) if has_videos else None
+    videos: Any = SimpleNamespace(reopen=lambda: reconnected.append("videos")) if has_videos else None
     assert bridge_module._make_reconnect(rig, videos)() == {"name": "mouse"}
-    assert done == called
+    assert reconnected == called
 
 
 @pytest.mark.parametrize(("described", "rows"), [
@@ -344,7 +344,9 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
         caplog.clear()
         STEPS[step](bridge, world)
         logged += [
-            one.getMessage() for one in caplog.records if one.levelno >= logging.WARNING or one.msg == DEVICE_FAILED
+            record.getMessage()
+            for record in caplog.records
+            if record.levelno >= logging.WARNING or record.msg == DEVICE_FAILED
         ]
         calls.setdefault(step, []).append(", ".join(map(words_of, world.done)))
         if isValid(bridge) and not bridge._has_left and name in VIEWS:
@@ -353,10 +355,18 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
         lines += [
             f"== {step}",
             *map(str, world.done),
-            *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records if one.levelno >= logging.WARNING),
+            *(
+                f"log {record.levelname} {record.getMessage()}"
+                for record in caplog.records
+                if record.levelno >= logging.WARNING
+            ),
         ]
         if isValid(bridge) and not bridge._has_left:
-            after = [*paged(bridge.participant.page), *value_lines(bridge.view(), "view"), f"trouble: {bridge.trouble}"]
+            after = [
+                *page_summary(bridge.participant.page),
+                *value_lines(bridge.view(), "view"),
+                f"trouble: {bridge.trouble}",
+            ]
             lines += (f"# {line}" for line in changed(before, after))
             before = after
     caplog.clear()

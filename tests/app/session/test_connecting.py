@@ -1,4 +1,4 @@
-"""The windows and parts of a session are made from the operator's choices, the study, the device and the store."""
+"""Windows and parts of a session follow from the operator's choices, the study, the device and the store."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -29,32 +29,32 @@ SEEN = STUDY.model_copy(
 )
 
 
-def collected(*values: Any, **named: Any) -> tuple[tuple[Any, ...], dict[str, Any]]:
+def collected_arguments(*values: Any, **named: Any) -> tuple[tuple[Any, ...], dict[str, Any]]:
     return values, named
 
 
 @pytest.mark.parametrize(
-    ("device", "blinding", "shown"),
+    ("device", "blinding", "options"),
     [
         ("mouse", "single", {"pointer": True, "felt": False, "stop_button": "", "force_limit_n": 6.5}),
         ("falcon", "double", {"pointer": False, "felt": True, "stop_button": "device button 4", "force_limit_n": None}),
     ],
 )
-def test_the_operators_window_has_the_limits_of_the_study_and_what_its_device_can(
-    monkeypatch: pytest.MonkeyPatch, device: str, blinding: str, shown: dict[str, Any]
+def test_the_operators_window_has_the_limits_of_the_study_and_its_device(
+    monkeypatch: pytest.MonkeyPatch, device: str, blinding: str, options: dict[str, Any]
 ) -> None:
-    monkeypatch.setattr(bridge_module, "OperatorWindow", collected)
+    monkeypatch.setattr(bridge_module, "OperatorWindow", collected_arguments)
     study = SEEN.model_copy(update={"study": SEEN.study.model_copy(update={"blinding": blinding})})
     rig: Any = SimpleNamespace(device=SimpleNamespace(workspace_m=(0.05, 0.07, 0.03)))
     window = bridge_module.make_operator_window(replace(CHOSEN, device=device), study, rig, DARK)
-    assert window == (("demo",), {"lateness_limit_s": 0.0035, "reach_m": 0.07, "theme": DARK, **shown})
+    assert window == (("demo",), {"lateness_limit_s": 0.0035, "reach_m": 0.07, "theme": DARK, **options})
 
 
 @pytest.mark.parametrize("shares_screen", [True, False])
 def test_the_participants_window_is_in_the_chosen_language_and_has_a_strip_on_a_shared_screen(
     monkeypatch: pytest.MonkeyPatch, shares_screen: bool
 ) -> None:
-    monkeypatch.setattr(bridge_module, "ParticipantWindow", collected)
+    monkeypatch.setattr(bridge_module, "ParticipantWindow", collected_arguments)
     monkeypatch.setattr(bridge_module, "Strip", lambda *, played: f"strip, played {played}")
     monkeypatch.setattr(bridge_module, "has_graphics_card", lambda: True)
     for pilot, device, in_step in ((True, "falcon", True), (False, "mouse", False)):
@@ -82,7 +82,7 @@ def test_the_participants_window_is_in_the_chosen_language_and_has_a_strip_on_a_
 def test_a_session_is_connected_with_the_parts_of_its_rig_and_its_store(
     monkeypatch: pytest.MonkeyPatch, device_name: str, device: Any, moves: bool, points: bool
 ) -> None:
-    monkeypatch.setattr(bridge_module, "SessionBridge", collected)
+    monkeypatch.setattr(bridge_module, "SessionBridge", collected_arguments)
     monkeypatch.setattr(bridge_module, "open_events", lambda lines, key: lines if key.nonce else [])
     servo = SimpleNamespace(fault=None, describe=lambda: {"priority": "real-time (SCHED_FIFO 60)"})
     rig: Any = SimpleNamespace(device=device, servo=servo)
@@ -112,28 +112,30 @@ def test_a_session_is_connected_with_the_parts_of_its_rig_and_its_store(
 def test_a_simulated_hand_rests_on_pages_and_between_intervals_and_acts_in_tasks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    done: list[Any] = []
+    actions: list[Any] = []
     monkeypatch.setattr(bridge_module, "hand_behaviour", lambda task, hand, draw, now_s: ("acts", task, hand, now_s))
-    monkeypatch.setattr(bridge_module, "rest_hand", lambda task, hand: done.append((task, hand)))
-    hand: Any = SimpleNamespace(rest=lambda: done.append("rests"))
+    monkeypatch.setattr(bridge_module, "rest_hand", lambda task, hand: actions.append((task, hand)))
+    hand: Any = SimpleNamespace(rest=lambda: actions.append("rests"))
     task = Explore(kind="explore", instruction="Move", min_s=1, max_s=60)
     text = TextPage(id="a", kind="break", title="", paragraphs=(), button="")
     tank = TaskPage(trial=1, instruction="", task=task, workspace_m=(0.1, 0.1, 0.1), body_radius_m=0.01, progress=None)
     hand_for_page = bridge_module._make_hand_for_page(hand, CHOSEN, lambda: 4.5)
     assert hand_for_page(text) is None
     assert hand_for_page(replace(tank, interval=Interval(2, 2, resting=True, announced=""))) is None
-    assert done == ["rests", (task, hand)]
+    assert actions == ["rests", (task, hand)]
     for interval in (None, Interval(2, 2, resting=False, announced="")):
         assert hand_for_page(replace(tank, interval=interval)) == ("acts", task, hand, 4.5)
-    assert len(done) == 2
+    assert len(actions) == 2
 
 
 @pytest.mark.parametrize(("device", "is_forceless"), [("mouse", True), ("scripted", False)])
 def test_the_plan_of_a_session_resumes_where_it_was_and_has_no_force_without_a_device_for_it(
     monkeypatch: pytest.MonkeyPatch, device: str, is_forceless: bool
 ) -> None:
-    asked: list[Any] = []
-    monkeypatch.setattr(bridge_module, "session_protocol", lambda folder, *given: asked.append(given) or given[0])
+    requests: list[Any] = []
+    monkeypatch.setattr(
+        bridge_module, "session_protocol", lambda folder, *arguments: requests.append(arguments) or arguments[0]
+    )
     monkeypatch.setattr(bridge_module, "start_of", lambda lines: lines[0])
     monkeypatch.setattr(bridge_module, "begun_schedule", lambda _protocol, first, key: f"schedule of {first}, {key}")
     monkeypatch.setattr(bridge_module, "without_force", lambda _protocol: "without force")
@@ -152,4 +154,4 @@ def test_the_plan_of_a_session_resumes_where_it_was_and_has_no_force_without_a_d
         assert bridge_module.session_plan(chosen, protocol, store) == (
             "without force" if is_forceless else "recorded study", "schedule of first, key", start,
         )  # fmt: skip
-        assert asked.pop() == ("recorded study", "P007", 2)
+        assert requests.pop() == ("recorded study", "P007", 2)

@@ -27,12 +27,12 @@ LONG_MS = 600_000
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Need no patience; how long it is in truth is tested with the windows."""
+    """Shorten the hold; its real duration is tested with the windows."""
     monkeypatch.setattr(escape_key, "HOLD_MS", HOLD_MS)
 
 
 def foreign(parent: QWidget | None) -> QDialog:
-    """Return somebody else's dialog, with the keyboard in a field of it."""
+    """Return a foreign dialog with the focus in one of its fields."""
     dialog = QDialog(parent)
     field = QLineEdit()
     QVBoxLayout(dialog).addWidget(field)
@@ -65,9 +65,9 @@ def asking(ask: str) -> Callable[[Bridge], QWidget]:
 repeating, ending = (asking(f"ask_to_{what}") for what in ("repeat", "end"))
 
 
-def told(bridge: Bridge) -> QWidget:
+def message_window(bridge: Bridge) -> QWidget:
     bridge.operator.show_message("The display could not be measured", "It was disconnected.")
-    return next(one for one in bridge.operator.findChildren(QDialog) if one.isVisible())
+    return next(dialog for dialog in bridge.operator.findChildren(QDialog) if dialog.isVisible())
 
 
 def above_the_operator(bridge: Bridge) -> QWidget:
@@ -79,18 +79,18 @@ def by_itself(bridge: Bridge) -> QWidget:
     return bridge.kept  # type: ignore[attr-defined,no-any-return]
 
 
-WINDOWS = (participant, operator, repeating, ending, told, above_the_operator, by_itself)
-every_window = pytest.mark.parametrize("open_", WINDOWS, ids=lambda one: one.__name__)
+WINDOWS = (participant, operator, repeating, ending, message_window, above_the_operator, by_itself)
+every_window = pytest.mark.parametrize("open_", WINDOWS, ids=lambda opener: opener.__name__)
 # What a key leads to is the same in all: that it arrives in each of them is `test_held_escape_stops_the_force`.
 two_windows = pytest.mark.parametrize(
     "open_",
-    [*WINDOWS[:2], *(pytest.param(one, marks=pytest.mark.nightly) for one in WINDOWS[2:])],
-    ids=lambda one: one.__name__,
+    [*WINDOWS[:2], *(pytest.param(opener, marks=pytest.mark.nightly) for opener in WINDOWS[2:])],
+    ids=lambda opener: opener.__name__,
 )
 
 
 def in_focus(window: QWidget, qtbot: Any) -> QWindow:
-    """Give the keyboard to ``window`` and return what the system sends keys to."""
+    """Activate ``window`` and return the handle that receives its keys."""
     window.activateWindow()
     handle: QWindow = window.windowHandle()
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is handle)
@@ -139,7 +139,7 @@ def test_a_question_that_goes_with_the_press_ends_no_hold(bridge: Bridge, world:
     qtbot.waitUntil(lambda: not world.force_is_on)
 
 
-@pytest.mark.parametrize("open_", [ending, told], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("open_", [ending, message_window], ids=lambda opener: opener.__name__)
 def test_a_dialog_that_goes_leaves_the_keyboard_to_somebody(
     bridge: Bridge, world: World, qtbot: Any, open_: Callable[[Bridge], QWidget]
 ) -> None:
@@ -151,9 +151,7 @@ def test_a_dialog_that_goes_leaves_the_keyboard_to_somebody(
     qtbot.waitUntil(lambda: not world.force_is_on)
 
 
-def test_a_window_that_comes_forward_ends_no_hold_and_the_keyboards_repetition_is_no_second_press(
-    bridge: Bridge, world: World, qtbot: Any
-) -> None:
+def test_raising_a_window_keeps_a_hold_and_key_repetition_is_ignored(bridge: Bridge, world: World, qtbot: Any) -> None:
     begin_trial(bridge, world)
     QTest.keyPress(in_focus(bridge.participant, qtbot), ESC)
     handle = in_focus(bridge.operator, qtbot)

@@ -1,4 +1,4 @@
-"""Whatever fails ends in zero force, is written down once and told; a device that failed is connected again."""
+"""Every failure ends in zero force and is recorded and reported once; a failed device is reconnected."""
 
 import pkgutil
 import threading
@@ -17,12 +17,12 @@ from study_app.gui.widgets.main_view import EscapeKey
 from study_app.session.pages import TaskPage, TroublePage
 from study_app.session.transitions.events import EndRequested
 from tests.app.world import begin_trial
-from tests.plug_in_packages import forget, install
+from tests.plug_in_packages import forget_plug_ins, install
 
 pytestmark = pytest.mark.slow
 
 
-def test_what_breaks_in_a_slot_is_zero_force_and_told_and_written_once(bridge, world, caplog):
+def test_an_exception_in_a_slot_ends_in_zero_force_and_is_reported_once(bridge, world, caplog):
     begin_trial(bridge, world)
     world.broken_clock = True
     bridge.draw_frame()
@@ -43,7 +43,7 @@ def test_what_breaks_in_a_slot_is_zero_force_and_told_and_written_once(bridge, w
 def test_a_plug_in_that_fails_is_zero_force_and_named(bridge, world, caplog, tmp_path, monkeypatch):
     install(tmp_path, "toy-plug", "task", {"toy": "toy_plug:draw"}, toy_plug="def draw(_now_ns):\n    return 1 / 0\n")
     monkeypatch.syspath_prepend(tmp_path)
-    forget()
+    forget_plug_ins()
     begin_trial(bridge, world)
     assert world.force_is_on
     monkeypatch.setattr(bridge.runner, "view", pkgutil.resolve_name("toy_plug:draw"))
@@ -55,7 +55,7 @@ def test_a_plug_in_that_fails_is_zero_force_and_named(bridge, world, caplog, tmp
     assert said[1:] in bridge.operator.banner.what.text()
     assert world.events().count("broke") == 1
     caplog.clear()
-    forget("toy_plug")
+    forget_plug_ins("toy_plug")
 
 
 def test_several_waits_share_one_limit(monkeypatch):
@@ -69,7 +69,7 @@ BROKEN = "no such colour"
 
 
 class Breaking:
-    """Lets a method of a window fail from ``now`` on: in a slot or an event that Qt calls itself."""
+    """A patch that lets a window's method fail from ``now`` on, in a slot or an event called by Qt."""
 
     def __init__(self, monkeypatch, owner, method):
         self.on, self.failed, kind = False, 0, pkgutil.resolve_name(f"study_app.gui.{owner}")
@@ -120,7 +120,7 @@ def paint_position(bridge):
         ),
     ],
 )
-def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
+def test_a_failure_in_any_window_ends_in_zero_force_and_is_reported(
     make, world, qtbot, monkeypatch, caplog, owner, method, do
 ):
     breaking = Breaking(monkeypatch, owner, method)
@@ -173,7 +173,7 @@ def test_a_part_of_the_participants_window_from_elsewhere_that_cannot_be_painted
         ("operator.session_panels.Tally", "show_view", mark),
     ],
 )
-def test_a_part_of_the_operators_window_that_fails_is_told_once_and_the_session_goes_on(
+def test_a_failed_part_of_the_operators_window_is_reported_once_and_the_session_continues(
     make, world, qtbot, monkeypatch, caplog, owner, method, do
 ):
     breaking = Breaking(monkeypatch, owner, method)
@@ -186,13 +186,13 @@ def test_a_part_of_the_operators_window_that_fails_is_told_once_and_the_session_
         do(bridge)
         bridge.show_tiles()
         qtbot.wait(5)  # in Qt's loop, as it is in the program
-    said = [one.text() for notice in bridge.operator.findChildren(Question) for one in notice.findChildren(QLabel)]
+    said = [label.text() for notice in bridge.operator.findChildren(Question) for label in notice.findChildren(QLabel)]
     assert said.count(f"ValueError: {BROKEN}. The session continues.") == 1
     assert (world.force_is_on, bridge.trouble) == (True, "")
     assert isinstance(bridge.participant.page, TaskPage)
     assert "broke" not in world.events()
-    told = [entry[1]["text"] for entry in world.done if entry[0] == "note" and entry[1]["kind"] == "note"]
-    assert [BROKEN in text for text in told] == [True]
+    notes = [entry[1]["text"] for entry in world.done if entry[0] == "note" and entry[1]["kind"] == "note"]
+    assert [BROKEN in text for text in notes] == [True]
     assert BROKEN in caplog.text
     breaking.on = False
     caplog.clear()
@@ -200,7 +200,7 @@ def test_a_part_of_the_operators_window_that_fails_is_told_once_and_the_session_
 
 @pytest.mark.qt_log_ignore("QBackingStore::endPaint")
 def test_a_painter_that_a_failure_leaves_at_work_is_ended(make, world, qtbot, monkeypatch, caplog):
-    """Else Qt paints no window any more: what failed could not even be read."""
+    """Otherwise Qt paints no window any more, and the error could not be read."""
     left = []
 
     def broken(painter, _place, **_named):
@@ -221,7 +221,7 @@ def test_a_painter_that_a_failure_leaves_at_work_is_ended(make, world, qtbot, mo
     caplog.clear()
 
 
-def test_a_thread_that_ends_by_an_exception_is_told_noted_and_ends_no_session(bridge, world, qtbot, caplog):
+def test_an_exception_in_a_thread_is_reported_and_noted_without_ending_the_session(bridge, world, qtbot, caplog):
     begin_trial(bridge, world)
     thread = threading.Thread(target=lambda: 1 / 0, name="recorder")
     thread.start()
@@ -253,7 +253,7 @@ FAULT = "the device 'memory' stopped responding"
 
 
 class Device:
-    """Connects when it is let go on, or fails; ``calls`` counts how often it was asked to."""
+    """A device that reconnects on a signal, or fails; ``calls`` counts the attempts."""
 
     def __init__(self, world):
         self.world, self.calls = world, 0
@@ -298,7 +298,7 @@ def test_a_session_that_ends_meanwhile_stays_ended(lost, device, world, qtbot):
     assert world.events()[-1] == "session_ended"
 
 
-def test_a_device_that_fails_to_open_is_no_failure_of_the_program(lost, device, world, qtbot, caplog):
+def test_a_device_that_fails_to_open_does_not_fail_the_session(lost, device, world, qtbot, caplog):
     device.error = OSError("the bus is gone")
     lost.operator.ask("reconnect")
     device.go_on.set()

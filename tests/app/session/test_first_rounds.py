@@ -1,4 +1,4 @@
-"""What the operator or the participant does while a session's windows are still being shown."""
+"""Actions of operator or participant while a session's windows are still being shown."""
 
 import json
 from collections.abc import Callable
@@ -77,9 +77,9 @@ class ScreensDeleted(LiveSession):
 
     def _run_next_step(self) -> None:
         super()._run_next_step()
-        asked = QWidget()
-        asked.screen()
-        shiboken6.delete(asked)
+        other_widget = QWidget()
+        other_widget.screen()
+        shiboken6.delete(other_widget)
 
 
 def test_windows_deleted_while_a_session_opens_take_no_screen_from_it(

@@ -30,7 +30,7 @@ CHOSEN = replace(small.CHOSEN, device="scripted")
 
 
 class Part:
-    """Something open that says when it is closed; one that ``fails`` cannot be."""
+    """An open part that records its closing; one that ``fails`` cannot be closed."""
 
     def __init__(self, name: str, closed: list[str], *, fails: bool = False) -> None:
         self._name, self._closed, self._fails = name, closed, fails
@@ -72,22 +72,22 @@ def test_the_force_is_zero_first_and_a_part_that_fails_leaves_no_other_open(
 
 
 class Stepped(LiveSession):
-    """A session whose windows open in three steps, which it keeps."""
+    """A session whose windows open in three steps, which it records."""
 
     def __init__(self) -> None:
         super().__init__(CHOSEN, LIGHT)
         self.taken: list[object] = []
 
-    def open_windows(self, made: object) -> Iterator[None]:
-        if isinstance(made, Exception):
-            raise made
+    def open_windows(self, ready: object) -> Iterator[None]:
+        if isinstance(ready, Exception):
+            raise ready
         for step in range(3):
             self.taken.append(step)
             yield
 
-    def hear(self, made: object) -> None:
-        """Hear what the thread made ready, or what it met."""
-        self._open_windows(made)
+    def hear(self, ready: object) -> None:
+        """Receive the parts that the thread prepared, or its exception."""
+        self._open_windows(ready)
 
 
 READY: Any = Ready(SimpleNamespace(), SimpleNamespace())
@@ -104,8 +104,10 @@ def test_other_events_are_handled_while_windows_open_which_are_opened_once(qtbot
 
 
 def windows() -> list[str]:
-    mine = [one for one in QApplication.topLevelWidgets() if isinstance(one, OperatorWindow | ParticipantWindow)]
-    return sorted(type(one).__name__ for one in mine)
+    session_windows = [
+        widget for widget in QApplication.topLevelWidgets() if isinstance(widget, OperatorWindow | ParticipantWindow)
+    ]
+    return sorted(type(window).__name__ for window in session_windows)
 
 
 @pytest.mark.slow
@@ -136,12 +138,12 @@ def test_changed_conditions_are_refused_before_a_device_opens(qtbot, tmp_path, m
     study = load("demo")
     unused = next(iter(study.liquids.values())).model_copy(update={"id": "unused"})
     open_or_draw_key(tmp_path, study.model_copy(update={"liquids": {**study.liquids, "unused": unused}}))
-    opened = []
-    monkeypatch.setattr(live_session, "open_rig", lambda name, *_, **__: opened.append(name))
+    devices = []
+    monkeypatch.setattr(live_session, "open_rig", lambda name, *_, **__: devices.append(name))
     live = LiveSession(replace(small.CHOSEN, results=tmp_path), LIGHT)
     with qtbot.waitSignal(live.over):
         live.open()
     live.wait()
     assert isinstance(live.error, StoreError)
     assert "sealed for conditions that differ" in str(live.error)
-    assert opened == []
+    assert devices == []

@@ -1,4 +1,4 @@
-"""The question before a session: a servo that stops itself is told, and whoever goes back does not wait."""
+"""The pre-flight window: a stopped servo is reported, and going back does not wait."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -40,12 +40,12 @@ ERRORS = Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=())
 
 
 class Answering:
-    """In place of the process that appraises scenes: has the answers it was given, question by question."""
+    """A replacement of the process that appraises scenes, with given answers."""
 
-    given: tuple[Any, ...] = ()
+    given_answers: tuple[Any, ...] = ()
 
     def __init__(self) -> None:
-        self.asked = 0
+        self.question_count = 0
         self.works = True
         self.devices: list[Dynamics] = []
 
@@ -54,11 +54,15 @@ class Answering:
             assert question.stroke is not None
             assert question.stroke.speed_mps > 0
             self.devices.append(question.dynamics)
-        self.asked += 1
-        return self.asked
+        self.question_count += 1
+        return self.question_count
 
     def answers(self) -> list[tuple[int, Any]]:
-        return [(self.asked, COSTS), (self.asked, self.given[self.asked - 1])] if self.given else []
+        return (
+            [(self.question_count, COSTS), (self.question_count, self.given_answers[self.question_count - 1])]
+            if self.given_answers
+            else []
+        )
 
     def close(self) -> None:
         self.works = False
@@ -76,63 +80,65 @@ class Servo:
 
 @pytest.fixture
 def machine(monkeypatch: Any) -> Any:
-    """Stand for an open device with its servo."""
+    """Return a replacement of an open device with its servo."""
     monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
     return SimpleNamespace(servo=Servo())
 
 
 @pytest.fixture
 def ask(qapp: Any, machine: Any) -> Iterator[Callable[..., Preflight]]:
-    """Return a function that asks before a session of the demo, of such facts and outlets."""
-    made: list[Preflight] = []
+    """Return a function that opens the pre-flight of a demo session with given facts and outlets."""
+    preflights: list[Preflight] = []
 
-    def ask(facts: Measurements = FACTS, chosen: NewSession = CHOSEN, **given: Any) -> Preflight:
-        ready = Ready(machine, facts, **given)
-        made.append(Preflight(chosen, load("demo"), ready, QGuiApplication.primaryScreen, "Participant P001", LIGHT))
-        made[-1].open()
-        return made[-1]
+    def ask(facts: Measurements = FACTS, chosen: NewSession = CHOSEN, **options: Any) -> Preflight:
+        ready = Ready(machine, facts, **options)
+        preflights.append(
+            Preflight(chosen, load("demo"), ready, QGuiApplication.primaryScreen, "Participant P001", LIGHT)
+        )
+        preflights[-1].open()
+        return preflights[-1]
 
     yield ask
-    for one in made:
-        one.close()
+    for preflight in preflights:
+        preflight.close()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 @pytest.fixture
-def asked(ask: Callable[..., Preflight]) -> Preflight:
+def preflight(ask: Callable[..., Preflight]) -> Preflight:
     return ask()
 
 
-def rows_of(made: Preflight) -> dict[str, str]:
+def rows_of(preflight: Preflight) -> dict[str, str]:
     """Return the rows about the coming session."""
-    texts = [one.text() for one in made.window.runs.findChildren(QLabel)]
+    texts = [label.text() for label in preflight.window.runs.findChildren(QLabel)]
     return dict(zip(texts[1::2], texts[2::2], strict=True))
 
 
 @pytest.mark.parametrize(("device", "masking"), [("mouse", None), ("falcon", Masking("noise", 60))])
-def test_a_session_begins_with_what_was_measured_and_answered(
+def test_a_session_begins_with_the_measurements_and_answers(
     ask: Callable[..., Preflight], monkeypatch: Any, qtbot: Any, device: str, masking: Masking | None
 ) -> None:
     errors = [replace(ERRORS, force_n=force_n) for force_n in (0.02, 0.25, 0.13)]
     delivery = PredictedDelivery(missing=0, asked=0, out=0, judged=8, limit_percent=25)
     count = len(preflight_controller.study_scenes(load("demo")))
-    monkeypatch.setattr(Answering, "given", (*errors[:count], delivery))
-    made = ask(chosen=replace(CHOSEN, device=device))
-    assert rows_of(made)["Expected force error"] == "measuring …"
-    qtbot.waitUntil(lambda: made.appraisal.is_over)
-    qtbot.waitUntil(lambda: rows_of(made)["Expected force error"] == "0.25 N")
-    assert made.window.who.text() == "demo  ·  Participant P001"
-    assert made._facts.delivery == delivery
-    assert made._facts.tick_s == pytest.approx(146e-9)
-    if made.window.masking is not None:
-        made.window.masking.means.setCurrentIndex(2)
-    with qtbot.waitSignal(made.started) as started:
-        made.window.start.click()
+    monkeypatch.setattr(Answering, "given_answers", (*errors[:count], delivery))
+    preflight = ask(chosen=replace(CHOSEN, device=device))
+    assert rows_of(preflight)["Expected force error"] == "measuring…"
+    qtbot.waitUntil(lambda: preflight.appraisal.is_over)
+    qtbot.waitUntil(lambda: rows_of(preflight)["Expected force error"] == "0.25 N")
+    assert preflight.window.who.text() == "demo  ·  Participant P001"
+    assert preflight._facts.delivery == delivery
+    assert preflight._facts.tick_s == pytest.approx(146e-9)
+    if preflight.window.masking is not None:
+        preflight.window.masking.means.setCurrentIndex(2)
+    with qtbot.waitSignal(preflight.started) as started:
+        preflight.window.start.click()
     (ready,) = started.args
-    assert (ready.masking, ready.rig, ready.facts.tick_s) == (masking, made._ready.rig, pytest.approx(146e-9))
-    with qtbot.waitSignal(made.cancelled):
-        made.window._done = False
-        made.window.close()
+    assert (ready.masking, ready.rig, ready.facts.tick_s) == (masking, preflight._ready.rig, pytest.approx(146e-9))
+    with qtbot.waitSignal(preflight.cancelled):
+        preflight.window._done = False
+        preflight.window.close()
 
 
 def test_the_most_expensive_scene_and_the_largest_errors_of_the_velocity_count(monkeypatch: Any) -> None:
@@ -143,7 +149,9 @@ def test_the_most_expensive_scene_and_the_largest_errors_of_the_velocity_count(m
         for number, (tick_ns, velocity) in enumerate(zip(costs_ns, velocities, strict=True), 1)
     ]
     late = (1, replace(COSTS, tick_ns=900.0))  # of a question that was answered
-    monkeypatch.setattr(Answering, "answers", lambda self: [late] * (self.asked > 1) + answers[self.asked - 1])
+    monkeypatch.setattr(
+        Answering, "answers", lambda self: [late] * (self.question_count > 1) + answers[self.question_count - 1]
+    )
     appraisal = Appraisal([preflight_controller.study_scenes(load("demo"))[0]] * 3, UNKNOWN)
     ticks_s = []
     while not appraisal.is_over:
@@ -170,25 +178,25 @@ def test_an_appraisal_is_over_without_open_questions_or_without_its_process(
 
 
 def test_the_row_of_the_force_error_is_hidden_if_its_process_ends_without_an_answer(
-    asked: Preflight, qtbot: Any
+    preflight: Preflight, qtbot: Any
 ) -> None:
-    (name,) = (row for row in asked.window.runs.findChildren(QLabel) if row.text() == "Expected force error")
+    (name,) = (row for row in preflight.window.runs.findChildren(QLabel) if row.text() == "Expected force error")
     assert not name.isHidden()
-    asked.appraisal.close()
+    preflight.appraisal.close()
     qtbot.waitUntil(name.isHidden)
 
 
-def test_a_device_that_is_lost_meanwhile_is_told_once(asked: Preflight, machine: Any, qtbot: Any) -> None:
-    told: list[object] = []
-    asked.failed.connect(told.append)
+def test_a_device_lost_meanwhile_is_reported_once(preflight: Preflight, machine: Any, qtbot: Any) -> None:
+    errors: list[object] = []
+    preflight.failed.connect(errors.append)
     machine.servo.lost = True
-    with qtbot.waitSignal(asked.failed, timeout=3000):
+    with qtbot.waitSignal(preflight.failed, timeout=3000):
         pass
-    assert not asked.findChild(QTimer).isActive()
-    assert [str(error) for error in told] == ["the device 'falcon' does not answer any more; the force is zero"]
+    assert not preflight.findChild(QTimer).isActive()
+    assert [str(error) for error in errors] == ["the device 'falcon' does not answer any more; the force is zero"]
 
 
-def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, monkeypatch: Any) -> None:
+def test_going_back_does_not_wait_for_a_measurement(preflight: Preflight, monkeypatch: Any) -> None:
     begun, waited = threading.Event(), []
 
     def slow(_machine: Any, _chosen: Any, _videos: Any, *, sleep: Any) -> Measurements:
@@ -197,39 +205,41 @@ def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, m
         return FACTS
 
     monkeypatch.setattr(preflight_controller, "measure_rig", slow)
-    asked.window.again_asked.emit()
-    measuring = asked.measuring
+    preflight.window.again_asked.emit()
+    measuring = preflight.measuring
     assert measuring.busy
     assert begun.wait(5)
-    asked.close()
+    preflight.close()
     assert measuring.wait(0)
     assert waited == [True]
 
 
-def test_a_window_that_is_gone_takes_no_screen_from_what_is_measured_again(
-    asked: Preflight, monkeypatch: Any, qtbot: Any
+def test_a_deleted_window_takes_no_screen_from_a_repeated_measurement(
+    preflight: Preflight, monkeypatch: Any, qtbot: Any
 ) -> None:
-    """PySide gives a screen up with the widget whose ``screen()`` returned it last."""
+    """PySide releases a screen with the widget whose ``screen()`` returned it last."""
     monkeypatch.setattr(preflight_controller, "measure_rig", lambda *_words, **_named: FACTS)
     other = QWidget()
     other.screen()
     other.deleteLater()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-    asked.window.again.click()
-    qtbot.waitUntil(asked.window.start.isEnabled, timeout=3000)
+    preflight.window.again.click()
+    qtbot.waitUntil(preflight.window.start.isEnabled, timeout=3000)
 
 
-def test_a_screen_that_is_removed_meanwhile_ends_the_question(asked: Preflight, monkeypatch: Any, qtbot: Any) -> None:
+def test_a_screen_that_is_removed_meanwhile_ends_the_question(
+    preflight: Preflight, monkeypatch: Any, qtbot: Any
+) -> None:
     def none_left() -> Any:
         raise DisplayError("screen 2 cannot be used: there is 1 screen")
 
     monkeypatch.setattr(preflight_controller, "measure_rig", lambda *_words, **_named: FACTS)
-    monkeypatch.setattr(asked, "_screen", none_left)
-    with qtbot.waitSignal(asked.failed, timeout=3000) as told:
+    monkeypatch.setattr(preflight, "_screen", none_left)
+    with qtbot.waitSignal(preflight.failed, timeout=3000) as failure:
         pass
-    assert "cannot be used" in str(told.args[0])
-    with qtbot.waitSignal(asked.failed, timeout=3000):
-        asked.window.again.click()
+    assert "cannot be used" in str(failure.args[0])
+    with qtbot.waitSignal(preflight.failed, timeout=3000):
+        preflight.window.again.click()
 
 
 def test_a_session_on_two_screens_asks_about_the_participants(machine: Any, monkeypatch: Any, qapp: Any) -> None:
@@ -238,13 +248,13 @@ def test_a_session_on_two_screens_asks_about_the_participants(machine: Any, monk
     monkeypatch.setattr(live, "chosen_screens", lambda: (participants, QGuiApplication.primaryScreen()))
     live._show_preflight(Ready(machine, FACTS))
     assert live.preflight is not None
-    said = [one.text() for one in live.preflight.window.findChildren(QLabel)]
+    said = [label.text() for label in live.preflight.window.findChildren(QLabel)]
     assert "75.0 Hz, 150 %" in said
-    asked = live.preflight
+    preflight = live.preflight
     live.end_by_signal(15)
-    assert not asked.window.isVisible(), "no question stays without its session"
-    assert isinstance(asked.appraisal.appraiser, Answering)
-    assert not asked.appraisal.appraiser.works
+    assert not preflight.window.isVisible(), "no question stays without its session"
+    assert isinstance(preflight.appraisal.appraiser, Answering)
+    assert not preflight.appraisal.appraiser.works
 
 
 class ConnectedLater:
@@ -258,10 +268,10 @@ class ConnectedLater:
 
 def test_a_recording_program_that_is_connected_meanwhile_is_shown(ask: Callable[..., Preflight], qtbot: Any) -> None:
     outlets = ConnectedLater()
-    made = ask(outlets=outlets)
+    preflight = ask(outlets=outlets)
 
     def shown() -> list[str]:
-        return [one.text() for one in made.window.findChildren(QLabel) if one.isVisible()]
+        return [label.text() for label in preflight.window.findChildren(QLabel) if label.isVisible()]
 
     assert "no listener" in shown()
     outlets.listens = True
@@ -272,38 +282,38 @@ def test_a_recording_program_that_is_connected_meanwhile_is_shown(ask: Callable[
 def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_changed(
     ask: Callable[..., Preflight], monkeypatch: Any, qtbot: Any
 ) -> None:
-    found = replace(FACTS, dynamics=Dynamics(delay_s=0.0004, count_m=20e-6, mass_kg=0.3), delay_ticks=1)
-    made = ask(found)
-    first: Any = made.appraisal.appraiser
+    measured = replace(FACTS, dynamics=Dynamics(delay_s=0.0004, count_m=20e-6, mass_kg=0.3), delay_ticks=1)
+    preflight = ask(measured)
+    first: Any = preflight.appraisal.appraiser
     assert first.devices == [Dynamics(delay_s=0.001, count_m=20e-6, mass_kg=0.3)]
-    slower = replace(found, delay_ticks=3)
+    slower = replace(measured, delay_ticks=3)
     monkeypatch.setattr(preflight_controller, "measure_rig", lambda *_words, **_named: slower)
-    made.window.again_asked.emit()
-    qtbot.waitUntil(lambda: not made.measuring.busy)
-    again: Any = made.appraisal.appraiser
+    preflight.window.again_asked.emit()
+    qtbot.waitUntil(lambda: not preflight.measuring.busy)
+    again: Any = preflight.appraisal.appraiser
     assert again.devices == [Dynamics(delay_s=0.003, count_m=20e-6, mass_kg=0.3)]
     assert not first.works
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
-    asked: Preflight, monkeypatch: Any, qtbot: Any
+    preflight: Preflight, monkeypatch: Any, qtbot: Any
 ) -> None:
     def broken(*_words: Any, **_named: Any) -> Measurements:
         raise ValueError("no samples")
 
     monkeypatch.setattr(preflight_controller, "measure_rig", broken)
-    with qtbot.waitSignal(asked.failed) as failed:
-        asked.window.again_asked.emit()
+    with qtbot.waitSignal(preflight.failed) as failed:
+        preflight.window.again_asked.emit()
     assert isinstance(failed.args[0], ValueError)
-    assert not asked.measuring.busy
+    assert not preflight.measuring.busy
     for thread in threading.enumerate():
         if thread.name == "background":
             thread.join(10)  # it reports its exception within this test
 
 
 @pytest.mark.parametrize(
-    ("told", "largest"),
+    ("answers", "largest"),
     [
         (
             (
@@ -322,12 +332,12 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
         (("it could not be measured", Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=())), None),
     ],
 )
-def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: Any, largest: float | None) -> None:
+def test_an_unknown_error_is_not_reported_as_zero(monkeypatch: Any, answers: Any, largest: float | None) -> None:
     monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
-    monkeypatch.setattr(Answering, "given", told)
+    monkeypatch.setattr(Answering, "given_answers", answers)
     protocol = load("demo")
-    asked = preflight_controller.study_scenes(protocol)[0]
-    appraisal = Appraisal([asked, asked], UNKNOWN)
+    question = preflight_controller.study_scenes(protocol)[0]
+    appraisal = Appraisal([question, question], UNKNOWN)
     while not appraisal.is_over:
         appraisal.read_answers()
     assert appraisal.error_n == largest
@@ -337,22 +347,25 @@ def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: A
 def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its_tasks(monkeypatch: Any) -> None:
     monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
     protocol = load("rek2024")
-    asked = preflight_controller.study_scenes(protocol)
-    assert {one.liquid for one in asked} == set(protocol.liquids)
-    assert {one.stroke for one in asked if one.liquid == "honey"} == {Stroke(5.0, 0.03)}  # it is explored
+    questions = preflight_controller.study_scenes(protocol)
+    assert {question.liquid for question in questions} == set(protocol.liquids)
+    assert {question.stroke for question in questions if question.liquid == "honey"} == {
+        Stroke(5.0, 0.03)
+    }  # it is explored
     monkeypatch.setattr(
         Answering,
-        "given",
+        "given_answers",
         tuple(
-            Errors(wake=0.0, force_n=0.0, lag_s=0.0, left_out=(), withheld=0.01 * (n + 1)) for n in range(len(asked))
+            Errors(wake=0.0, force_n=0.0, lag_s=0.0, left_out=(), withheld=0.01 * (n + 1))
+            for n in range(len(questions))
         ),
     )
-    appraisal = Appraisal(asked, UNKNOWN)
+    appraisal = Appraisal(questions, UNKNOWN)
     assert appraisal.withheld is None
     while not appraisal.is_over:
         appraisal.read_answers()
     assert appraisal.withheld == {
-        name: pytest.approx(0.01 * (1 + max(n for n, one in enumerate(asked) if one.liquid == name)))
+        name: pytest.approx(0.01 * (1 + max(n for n, question in enumerate(questions) if question.liquid == name)))
         for name in protocol.liquids
     }
 
@@ -362,10 +375,10 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
 )
 def test_the_trials_that_would_not_be_delivered_are_asked_last(monkeypatch: Any, answer: Any) -> None:
     monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
-    monkeypatch.setattr(Answering, "given", (Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=()), answer))
+    monkeypatch.setattr(Answering, "given_answers", (Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=()), answer))
     protocol = load("demo")
-    asked = preflight_controller.study_scenes(protocol)[:1]
-    appraisal = Appraisal(asked, UNKNOWN, DeliveryQuestion(protocol, 1))
+    questions = preflight_controller.study_scenes(protocol)[:1]
+    appraisal = Appraisal(questions, UNKNOWN, DeliveryQuestion(protocol, 1))
     while not appraisal.is_over:
         appraisal.read_answers()
     assert appraisal.error_n == 0.02

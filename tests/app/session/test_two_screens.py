@@ -1,4 +1,4 @@
-"""A session stands on the screens that are set for the machine, where the command names none."""
+"""A session uses the screens set for the machine unless the command names one."""
 
 import json
 import os
@@ -33,7 +33,7 @@ chosen = NewSession(
     source="demo", participant="P001", session=1, seed=1, operator="", language="en", device="scripted", windowed=False,
     screen=None, results=Path(sys.argv[1]),
 )
-live, loop, found = LiveSession(chosen, LIGHT), QEventLoop(), []
+live, loop, facts = LiveSession(chosen, LIGHT), QEventLoop(), []
 live.settings = live.settings.model_copy(update={"screen": "left", "screen_number": 1})
 
 def look():
@@ -41,8 +41,8 @@ def look():
         return
     timer.stop()
     windows = live.bridge.participant, live.bridge.operator
-    found.extend([window.screen().name(), window.geometry().x()] for window in windows)
-    found.append(live.bridge.strip is None)
+    facts.extend([window.screen().name(), window.geometry().x()] for window in windows)
+    facts.append(live.bridge.strip is None)
     live.bridge.participant.windowHandle().setScreen(live.bridge.operator.windowHandle().screen())
     live.bridge.participant.showFullScreen()
     timer.timeout.disconnect(look)
@@ -52,7 +52,7 @@ def look():
 def look_again():
     if live.bridge.runner.state.phase.name == "PAUSED":
         timer.stop()
-        found.append(live.bridge.operator.isActiveWindow())
+        facts.append(live.bridge.operator.isActiveWindow())
         live.end_by_signal(15)
 
 timer = QTimer()
@@ -62,14 +62,14 @@ live.over.connect(loop.quit)
 live.open()
 loop.exec()
 live.wait()
-print(json.dumps(found))
+print(json.dumps(facts))
 """
 
 
-def test_both_windows_stand_on_the_screens_that_are_set_until_one_is_removed(tmp_path: Path) -> None:
+def test_both_windows_use_the_configured_screens_until_one_is_removed(tmp_path: Path) -> None:
     screens = tmp_path / "screens.json"
     screens.write_text(json.dumps({"screens": SCREENS}), encoding="utf-8", newline="\n")
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(tmp_path / "results")],
         env=os.environ | {"QT_QPA_PLATFORM": f"offscreen:configfile={screens}", "XDG_CONFIG_HOME": str(tmp_path)},
         cwd=Path(__file__).parents[3],
@@ -78,7 +78,7 @@ def test_both_windows_stand_on_the_screens_that_are_set_until_one_is_removed(tmp
         check=False,
         timeout=300,
     )
-    assert done.returncode == 0, done.stderr
-    (participant, participant_x), (operator, operator_x), no_strip, _ = json.loads(done.stdout.splitlines()[-1])
+    assert process.returncode == 0, process.stderr
+    (participant, participant_x), (operator, operator_x), no_strip, _ = json.loads(process.stdout.splitlines()[-1])
     assert (participant, operator, no_strip) == ("left", "right", True)
     assert participant_x < 1600 <= operator_x

@@ -30,36 +30,41 @@ class Here(Executor):
     """Computes in this process."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Compute it at once."""
+        """Compute the task immediately."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
 
 
 def main(studies: str = "200", *sizes: str) -> int:
-    """Print for each statement the size that ``power`` names, and how many other studies show it; return the code."""
+    """Print for each statement the size by ``power`` and the rate of other studies that show it; return the code."""
     protocol = load("rek2024")
-    planned, asked = plan(protocol, condition_features(protocol, seed=SEED)), int(studies)
+    planned, study_count = plan(protocol, condition_features(protocol, seed=SEED)), int(studies)
     tried = tuple(map(int, sizes)) or (5, 8, 12, 16, 20, 24)
-    *_, (done, counts) = sweep(planned, tried, asked, SEED, Here())
-    curves = [one for one in powers(planned, tried, done, asked, SEED, counts).curves if one.item is not None]
-    wanted = {(one.block, one.item): (n, one.power[tried.index(n)]) for one in curves
-              if one.question in ("conditions differ", "trend") and (n := one.needed(tried))}  # fmt: skip
-    found: Counter[tuple[int, str, str | None]] = Counter()
+    *_, (finished_studies, counts) = sweep(planned, tried, study_count, SEED, Here())
+    curves = [
+        curve
+        for curve in powers(planned, tried, finished_studies, study_count, SEED, counts).curves
+        if curve.item is not None
+    ]
+    wanted = {(curve.block, curve.item): (n, curve.power[tried.index(n)]) for curve in curves
+              if curve.question in ("conditions differ", "trend") and (n := curve.needed(tried))}  # fmt: skip
+    times_shown: Counter[tuple[int, str, str | None]] = Counter()
     for n in sorted({n for n, _ in wanted.values()}):
-        for study in range(asked):
-            given = [
-                np.asarray(one.answers(1.0, PUBLISHED[TYPICAL])) for one in draw_opinions(planned, n, OTHER, study)
+        for study in range(study_count):
+            ratings = [
+                np.asarray(opinion.answers(1.0, PUBLISHED[TYPICAL]))
+                for opinion in draw_opinions(planned, n, OTHER, study)
             ]
-            _, results = report(planned, planned.decided, given, study, Failures())
+            _, results = report(planned, planned.decided, ratings, study, Failures())
             for block, result in zip(planned.blocks, results, strict=True):
                 tests = (*SettingsDiffer.value_in(result), *DelayTrend.value_in(result))
-                found.update((n, block.id, one.item) for one in tests if one.verdict in FOUND)
+                times_shown.update((n, block.id, test.item) for test in tests if test.verdict in FOUND)
     print("block, statement         n   power %   shown in %  [Wilson]")
     failed = False
     for (block, item), (n, power) in wanted.items():
-        share = found[n, block, item] / asked
-        low, high = interval(share, asked)
+        share = times_shown[n, block, item] / study_count
+        low, high = interval(share, study_count)
         failed |= high < WANTED
         ends = f"[{100 * low:.1f}, {100 * high:.1f}]"
         print(f"{block}, {item:16s} {n:4d} {100 * power:8.1f} {100 * share:11.1f}  {ends}")

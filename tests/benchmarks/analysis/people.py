@@ -103,24 +103,24 @@ def pairs(trials: pd.DataFrame, size: int, draw: np.random.Generator | None = No
         pieces = [slice(first, first + size) for first in range(0, len(levels) - size + 1, size)]
         fits = [fitted(own.iloc[piece], correct[piece], stimulus, grid) for piece in pieces]
         profiles = [profiled(own.iloc[piece], correct[piece]) for piece in pieces]
-        ends = [Ends(one.threshold, *one.interval) for one in fits]
-        alone = [replace(one, grid=replace(grid, session_sd=(0.0, 0.0))) for one in fits]
+        ends = [Ends(fit.threshold, *fit.interval) for fit in fits]
+        alone = [replace(fit, grid=replace(grid, session_sd=0.0)) for fit in fits]
         for place in range(len(fits) - 1):
             (low, high), (left, right) = difference(*ends[place : place + 2]), difference(*profiles[place : place + 2])
-            one, other = alone[place : place + 2]
+            first_fit, second_fit = alone[place : place + 2]
             yield Pair(
                 holds=low <= 0 <= high,
                 width=high - low,
                 profile_holds=left <= 0 <= right,
                 profile_width=right - left,
-                difference=other.threshold - one.threshold,
-                variance=one.variance + other.variance,
+                difference=second_fit.threshold - first_fit.threshold,
+                variance=first_fit.variance + second_fit.variance,
             )
 
 
 def spread(found: list[Pair]) -> tuple[float, float, float]:
     """Return the spread between pieces, and the ends of its 95 % interval [decades], by likelihood."""
-    differences, variances = np.array([one.difference for one in found]), np.array([one.variance for one in found])
+    differences, variances = np.array([pair.difference for pair in found]), np.array([pair.variance for pair in found])
     total = variances + 2 * SPREADS[:, None] ** 2
     log_likelihood = -0.5 * (differences**2 / total + np.log(total)).sum(axis=1)
     weights = np.exp(log_likelihood - log_likelihood.max())
@@ -137,21 +137,21 @@ def main(*arguments: str) -> int:
                 best, low, high = spread(list(pairs(own, size)))
                 print(f"{study:15s}{size:4d} trials: {best:.3f} [{low:.3f}, {high:.3f}] decades")
         return 0
-    repetitions, seed = (int(one) for one in (*arguments, *("10", "1")[len(arguments) :]))
+    repetitions, seed = (int(argument) for argument in (*arguments, *("10", "1")[len(arguments) :]))
     draw, failed = np.random.default_rng(seed), False
     print("data             pairs  held %  [Wilson]       profile held %  times as wide  stationary %")
     for name in STUDIES:
-        chosen = trials[trials["study"] == name]
-        people = list(pairs(chosen, PIECE))
-        control = [one.holds for _ in range(repetitions) for one in pairs(chosen, PIECE, draw)]
-        share, still = float(np.mean([one.holds for one in people])), float(np.mean(control))
+        study_trials = trials[trials["study"] == name]
+        people = list(pairs(study_trials, PIECE))
+        control = [pair.holds for _ in range(repetitions) for pair in pairs(study_trials, PIECE, draw)]
+        share, still = float(np.mean([pair.holds for pair in people])), float(np.mean(control))
         low, high = interval(share, len(people))
-        both = [one for one in people if one.holds and one.profile_holds]
-        wider = float(np.median([one.width / one.profile_width for one in both]))
+        both = [pair for pair in people if pair.holds and pair.profile_holds]
+        wider = float(np.median([pair.width / pair.profile_width for pair in both]))
         failed |= share < 0.9 or still < 0.93 or wider > 1.3
         print(
             f"{name:15s}{len(people):7d}{100 * share:8.1f}  [{100 * low:.1f}, {100 * high:.1f}]"
-            f"{100 * float(np.mean([one.profile_holds for one in people])):17.1f}{wider:15.2f}{100 * still:14.1f}"
+            f"{100 * float(np.mean([pair.profile_holds for pair in people])):17.1f}{wider:15.2f}{100 * still:14.1f}"
         )
     return 3 if failed else 0
 

@@ -20,7 +20,9 @@ STEPS = 6
 VALUES = ("noise_sd", "bias_sd", "slope_sd")
 
 
-def fitted(ratings: pd.DataFrame, assessor: str, product: pd.Series, attribute: str, scale: float) -> list[float]:
+def fitted_spreads(
+    ratings: pd.DataFrame, assessor: str, product: pd.Series, attribute: str, scale: float
+) -> list[float]:
     """Return residual SD, SD of intercepts [points of seven], and SD of slopes as a share of the mean slope."""
     from statsmodels.formula.api import mixedlm
 
@@ -37,14 +39,16 @@ def fitted(ratings: pd.DataFrame, assessor: str, product: pd.Series, attribute: 
 
 
 def main(folder: str) -> int:
-    """Print the values of each attribute and what is taken of them; return the code."""
+    """Print the values of each attribute and their summary; return the exit code."""
     screens, chocolates = (pd.read_csv(Path(folder) / f"{name}.csv") for name in ("TVbo", "sensochoc"))
     product = screens["TVset"].astype(str) + screens["Picture"].astype(str)
     first = list(screens).index("Coloursaturation")
-    panel = np.array([fitted(screens, "Assessor", product, name, 15) for name in list(screens)[first : first + 15]])
+    panel = np.array(
+        [fitted_spreads(screens, "Assessor", product, name, 15) for name in list(screens)[first : first + 15]]
+    )
     first = list(chocolates).index("CocoaA")
     names = list(chocolates)[first : first + 14]
-    rated = np.array([fitted(chocolates, "Panelist", chocolates["Product"], name, 10) for name in names])
+    rated = np.array([fitted_spreads(chocolates, "Panelist", chocolates["Product"], name, 10) for name in names])
     for name, row in zip(names, rated, strict=True):
         print(f"{name:12s} {row.round(2)}")
     computed = {CONSISTENT: np.median(panel, axis=0), TYPICAL: np.median(rated, axis=0), NOISY: rated.max(axis=0)}

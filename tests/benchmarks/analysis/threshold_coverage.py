@@ -113,7 +113,7 @@ def answered(case: Case, planted: np.ndarray, draw: np.random.Generator, trials:
 def studies(
     stimulus: Stimulus, places: np.ndarray, rights: np.ndarray, firsts: np.ndarray
 ) -> Iterator[tuple[ThresholdEstimate, ...]]:
-    """Yield what the report estimates of each `PEOPLE` observers, of the group first."""
+    """Yield the report's estimates of each `PEOPLE` observers, the group first."""
     block = LevelBlock("b", "b", "main", DESIGN, stimulus, (), default_method("questplus"))
     for start in range(0, len(places), PEOPLE):
         own = slice(start, start + PEOPLE)
@@ -121,7 +121,7 @@ def studies(
         levels = np.array(stimulus.grid)[places[own]].ravel()
         frame = pd.DataFrame({"level": levels, "level_delivered": levels, "success": rights[own].ravel()})
         frame["arrangement"] = np.where(firsts[own].ravel(), "CS", "SC")
-        frame["participant"], frame["trial"] = (one.ravel() for one in np.indices(shape))
+        frame["participant"], frame["trial"] = (indices.ravel() for indices in np.indices(shape))
         frame = frame.astype({"level_delivered": "Float64", "success": "boolean"})
         yield tuple(thresholds(block, frame.assign(block="b", standard=8.0, session=1, analysed=True, track="8/1")))
 
@@ -140,7 +140,7 @@ def power_of_exact_ratio(observers: int, seed: int) -> float:
         planted = MEDIAN_75 * BETWEEN ** draw.normal(size=observers)
         places, rights, _ = answered(Case(person), planted, draw, JUDGED)
         right, wrong = (
-            np.array([np.bincount(*one, len(levels)) for one in zip(places, some, strict=True)])
+            np.array([np.bincount(*cells, len(levels)) for cells in zip(places, some, strict=True)])
             for some in (rights, ~rights)
         )
         evidence = []
@@ -157,7 +157,7 @@ def main(observers: str = "1000", seed: str = "1", *stops: str) -> int:
     if stops == ("--exact",):
         print(f"power {100 * power_of_exact_ratio(int(observers), int(seed)):.1f} % where 5 % are false, seed {seed}")
         return 0
-    numbers, failed = [int(one) for one in stops or TRIALS], False
+    numbers, failed = [int(number) for number in stops or TRIALS], False
     print(f"{observers} observers, 2IFC, 75 % at {MEDIAN_75} (factor {BETWEEN}), QUEST+, seed {seed}")
     print(
         "                   trials  held %   error %    SD %   groups held % [Wilson]  error %  half interval %"
@@ -172,23 +172,25 @@ def main(observers: str = "1000", seed: str = "1", *stops: str) -> int:
                 math.log10(case.person.change) * ((trials - 1) / (max(numbers) - 1) - 1) / 2
             )  # the mean of these trials
             truth, true_mean = np.log10(planted) + moved, math.log10(MEDIAN_75) + moved
-            found = list(studies(case.stimulus, *(one[:, :trials] for one in presented)))
-            threshold, low, high = np.log10([(it.threshold, it.low, it.high) for _, *own in found for it in own]).T
-            ends = np.log10([(group.low, group.high) for group, *_ in found])
+            group_fits = list(studies(case.stimulus, *(values[:, :trials] for values in presented)))
+            threshold, low, high = np.log10(
+                [(fit.threshold, fit.low, fit.high) for _, *own in group_fits for fit in own]
+            ).T
+            ends = np.log10([(group.low, group.high) for group, *_ in group_fits])
             held, error = float(((low <= truth) & (truth <= high)).mean()), 10 ** float((threshold - truth).mean()) - 1
-            of_all = np.log10([group.threshold for group, *_ in found]) - truth.reshape(-1, PEOPLE).mean(axis=1)
+            of_all = np.log10([group.threshold for group, *_ in group_fits]) - truth.reshape(-1, PEOPLE).mean(axis=1)
             error_of_groups = 10 ** float(of_all.mean()) - 1
             spread = 10 ** float((threshold - truth).std(ddof=1)) - 1
             holds = (ends[:, 0] <= true_mean) & (true_mean <= ends[:, 1])
-            clusters = np.array([group.clustered for group, *_ in found])
-            told = clusters | [group.if_many_lapses is not None for group, *_ in found]
+            clusters = np.array([group.clustered for group, *_ in group_fits])
+            warned = clusters | [group.if_many_lapses is not None for group, *_ in group_fits]
             of_groups = float(holds.mean())
             least, most = interval(of_groups, len(ends))
             half = 10 ** float(np.median(np.diff(ends, axis=1)) / 2) - 1
             if trials == JUDGED:
                 failed |= most < LEAST_HELD
                 failed |= name in KINDS and max(abs(error), abs(error_of_groups)) > MOST_ERROR
-                missed = told[~holds]
+                missed = warned[~holds]
                 if name in INATTENTIVE and len(missed):
                     failed |= interval(float(missed.mean()), len(missed))[1] < LEAST_TOLD
                 failed |= name == "as assumed" and interval(float(clusters.mean()), len(clusters))[0] > MOST_FALSE
@@ -196,7 +198,8 @@ def main(observers: str = "1000", seed: str = "1", *stops: str) -> int:
                 f"{name:21s}{trials:4d}{100 * held:8.1f}{100 * error:+10.1f}{100 * spread:8.0f}"
                 f"{100 * of_groups:16.1f} [{100 * least:.1f}, {100 * most:.1f}]"
                 f"{100 * error_of_groups:+9.1f}{100 * half:12.0f}"
-                f"{clusters[~holds].sum():10d}, {told[~holds].sum()} of {(~holds).sum()}{100 * clusters.mean():17.1f}",
+                f"{clusters[~holds].sum():10d}, {warned[~holds].sum()} of {(~holds).sum()}"
+                f"{100 * clusters.mean():17.1f}",
                 flush=True,
             )
     return 3 if failed else 0

@@ -78,7 +78,7 @@ class End(NamedTuple):
 
 
 def end_program(device: str, way: str) -> End:
-    """Run a program that ends in one of `WAYS`, and return what its device exerted."""
+    """Run a program that ends in one of `WAYS`, and return the forces of its device."""
     ended = subprocess.run(
         [sys.executable, "-c", PREAMBLE + WAYS[way], device], capture_output=True, text=True, timeout=180, check=False
     )

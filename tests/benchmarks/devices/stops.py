@@ -39,7 +39,7 @@ NOISE_N = 0.5
 
 
 class Stand(NamedTuple):
-    """An open device, the hand at it, what acts on the handle (while the servo ticks or not), and commands so far."""
+    """An open device, the hand on it, the force on the handle (with or without servo), and the commands so far."""
 
     device: FramedDevice
     hand: HandOrders
@@ -77,7 +77,7 @@ STANDS = {"inverse3": inverse3, "falcon": falcon, "force-dimension": force_dimen
 
 @dataclass(slots=True)
 class Found:
-    """Counts of stops, and what was wrong of them; ``lateness_us`` are p50 and p99 of the servo's ticks."""
+    """Counts of stops and their faults; ``lateness_us`` are p50 and p99 of the servo's ticks."""
 
     stops: int = 0
     servo_stops: int = 0
@@ -89,7 +89,7 @@ class Found:
 
     @property
     def verdict(self) -> str:
-        """Whether it passed, in a line."""
+        """Return the result in one line."""
         if self.lost or self.faults:
             return f"FAILED: {len(self.lost)} stops lost, {len(self.faults)} faults"
         if self.under_force == 0:
@@ -98,15 +98,15 @@ class Found:
 
 
 def stop_again_and_again(name: str, seconds: float) -> Found:
-    """Return what was found of a device in so many seconds."""
-    found = Found()
+    """Stop the force of a device repeatedly for some seconds; return the findings."""
+    findings = Found()
     with STANDS[name]() as stand:
         servo = Servo(stand.device)
         servo.start()
         late: list[float] = []
         scene = load("rek2024").scene_for("honey")
         end, side = time.perf_counter() + seconds, 1.0
-        while time.perf_counter() < end and not found.faults:
+        while time.perf_counter() < end and not findings.faults:
             reader = servo.telemetry.reader()
             servo.load(scene)
             servo.fade_in()
@@ -114,19 +114,19 @@ def stop_again_and_again(name: str, seconds: float) -> Found:
             side = -side
             time.sleep(STROKE_S)
             samples = reader.read()
-            found.under_force += int(np.linalg.norm(samples["device_force_n"][-1]) > NOISE_N)
+            findings.under_force += int(np.linalg.norm(samples["device_force_n"][-1]) > NOISE_N)
             late += list(np.percentile(samples["lateness_ns"], [50, 99]) / 1e3)
-            whole = found.stops % EVERY == EVERY - 1
-            found.stops += 1
-            found.servo_stops += whole
-            _stop(servo, stand, found, whole=whole)
+            whole = findings.stops % EVERY == EVERY - 1
+            findings.stops += 1
+            findings.servo_stops += whole
+            _stop(servo, stand, findings, whole=whole)
             if servo.fault is not None:
-                found.faults.append(servo.fault)
+                findings.faults.append(servo.fault)
             if whole:
                 servo.start()
         servo.stop()
-    found.lateness_us = (float(np.median(late[::2])), float(np.median(late[1::2])))
-    return found
+    findings.lateness_us = (float(np.median(late[::2])), float(np.median(late[1::2])))
+    return findings
 
 
 def _stop(servo: Servo, stand: Stand, found: Found, *, whole: bool) -> None:
@@ -147,13 +147,13 @@ def _stop(servo: Servo, stand: Stand, found: Found, *, whole: bool) -> None:
 
 
 def under_windows(name: str, seconds: float) -> Found:
-    """Return what was found while both windows of a session paint."""
+    """Return the findings while both windows of a session paint."""
     from study_app.app.delay_session import WindowsThread
 
     windows = WindowsThread("gui")
-    found = windows.during(lambda: stop_again_and_again(name, seconds))
-    found.frames = windows.frames
-    return found
+    findings = windows.during(lambda: stop_again_and_again(name, seconds))
+    findings.frames = windows.frames
+    return findings
 
 
 def main(names: list[str], minutes: float) -> int:
@@ -162,12 +162,14 @@ def main(names: list[str], minutes: float) -> int:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     failed = False
     for name in names:
-        found = under_windows(name, 60.0 * minutes)
-        print(f"{name}: {found.stops} stops, {found.under_force} under force, {found.servo_stops} of the servo")
-        p50_us, p99_us = found.lateness_us
-        print(f"{found.frames} frames painted; lateness p50 {p50_us:.0f} us, p99 {p99_us:.0f} us")
-        print(*found.lost, *found.faults, f"{name}: {found.verdict}", sep="\n", flush=True)
-        failed = failed or not found.verdict.startswith("PASSED")
+        findings = under_windows(name, 60.0 * minutes)
+        print(
+            f"{name}: {findings.stops} stops, {findings.under_force} under force, {findings.servo_stops} of the servo"
+        )
+        p50_us, p99_us = findings.lateness_us
+        print(f"{findings.frames} frames painted; lateness p50 {p50_us:.0f} us, p99 {p99_us:.0f} us")
+        print(*findings.lost, *findings.faults, f"{name}: {findings.verdict}", sep="\n", flush=True)
+        failed = failed or not findings.verdict.startswith("PASSED")
     return 3 if failed else 0
 
 

@@ -19,9 +19,9 @@ from tests.evidence.stability.recorded_encoders import (
     ESTIMATORS,
     accuracy,
     excerpt,
-    felt,
     positions_m,
     recordings,
+    servo_samples,
     smoothed_mps,
 )
 
@@ -30,16 +30,16 @@ NAMED = 3
 
 
 def main() -> None:
-    """Print errors of the estimators, then what servo and safety layer did."""
-    found = list(recordings(Path(sys.argv[1]))) if len(sys.argv) > 1 else list(excerpt().items())
-    names = [name for name, _ in found]
-    print(f"{len(found)} recordings, {sum(len(counts) for _, counts in found) / 1000:.0f} s at 1 kHz")
+    """Print errors of the estimators, then the effects of servo and safety layer."""
+    recorded = list(recordings(Path(sys.argv[1]))) if len(sys.argv) > 1 else list(excerpt().items())
+    names = [name for name, _ in recorded]
+    print(f"{len(recorded)} recordings, {sum(len(counts) for _, counts in recorded) / 1000:.0f} s at 1 kHz")
     for column, (encoder, count_m) in enumerate(COUNTS_M.items()):
-        places_m = [positions_m(counts, encoder) for _, counts in found]
+        places_m = [positions_m(counts, encoder) for _, counts in recorded]
         fastest = 1e3 * np.array([np.abs(np.diff(x_m)).max() for x_m in places_m])
         print(f"\n{encoder}, {1e6 * count_m:.2g} µm a count; up to {fastest.max():.2g} m/s")
         for finer in list(COUNTS_M)[column:]:
-            pairs = zip(places_m, (counts for _, counts in found), strict=True)
+            pairs = zip(places_m, (counts for _, counts in recorded), strict=True)
             measured = np.array(
                 [accuracy(x_m, count_m, smoothed_mps(positions_m(counts, finer))) for x_m, counts in pairs]
             )
@@ -50,7 +50,9 @@ def main() -> None:
         longer = np.array([_difference(smoothed_mps(x_m), smoothed_mps(x_m, 61)) for x_m in places_m])
         _print_row("smoother of 61 samples", longer)
         for study, liquid in LIQUIDS:
-            _print_felt(study, liquid, names, [felt(load_scene(study, liquid), x_m, count_m) for x_m in places_m])
+            _print_felt(
+                study, liquid, names, [servo_samples(load_scene(study, liquid), x_m, count_m) for x_m in places_m]
+            )
 
 
 def _print_row(name: str, values: np.ndarray) -> None:

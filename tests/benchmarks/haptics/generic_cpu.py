@@ -38,7 +38,7 @@ for line in sys.stdin:
 """
 
 
-def begun(cpu: str | None) -> subprocess.Popen[str]:
+def start_process(cpu: str | None) -> subprocess.Popen[str]:
     """Start the process of a processor: "generic", or None for the one at hand."""
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CPU_NAME"}
     environment |= {"NUMBA_CPU_NAME": cpu} if cpu else {}
@@ -55,7 +55,7 @@ def line_of(program: subprocess.Popen[str]) -> str:
 
 
 def batch(program: subprocess.Popen[str], scene: str) -> float:
-    """Return what a tick of the next batch costs [ns]."""
+    """Return the cost of a tick in the next batch [ns]."""
     assert program.stdin is not None
     program.stdin.write(f"{scene}\n")
     program.stdin.flush()
@@ -64,7 +64,7 @@ def batch(program: subprocess.Popen[str], scene: str) -> float:
 
 def main() -> None:
     """Measure and print."""
-    programs = {"generic": begun("generic"), "native": begun(None)}
+    programs = {"generic": start_process("generic"), "native": start_process(None)}
     forces = {cpu: json.loads(line_of(program)) for cpu, program in programs.items()}
     costs: dict[str, dict[str, list[float]]] = {cpu: {scene: [] for scene in forces[cpu]} for cpu in programs}
     for _ in range(BATCHES):

@@ -24,7 +24,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--batches", type=int, default=400)
     try:
-        found = compare_with_plain_c(SCENES, batches=parser.parse_args().batches)
+        comparison = compare_with_plain_c(SCENES, batches=parser.parse_args().batches)
     except StudyError as error:
         print(error)
         return
@@ -37,10 +37,10 @@ def main() -> None:
             f"{it.ratio:.2f}",
             f"{it.difference:.0e}",
         )
-        for name, it in found.items()
+        for name, it in comparison.items()
     ]
     print(Table(HEADINGS, rows, left=1).text())
-    sys.exit(any(it.difference > MOST_DIFFERENCE for it in found.values()))
+    sys.exit(any(result.difference > MOST_DIFFERENCE for result in comparison.values()))
 
 
 if __name__ == "__main__":

@@ -28,12 +28,12 @@ CHOICES = {
 def cases(count: int) -> list[Case]:
     """Return cases that are drawn from all combinations, the same in every run."""
     drawn = Random(5).sample(list(itertools.product(*CHOICES.values())), count)  # noqa: S311 - no secret
-    named = (dict(zip(CHOICES, one, strict=True)) for one in drawn)
+    named = (dict(zip(CHOICES, values, strict=True)) for values in drawn)
     free = Case(hand=LETS_GO, estimator="kalman", viscous_nspm=0.0)
     return [
-        dataclasses.replace(free, **it, delay=delay, believed=believed)
-        for it in named
-        for delay, believed in [it.pop("delay")]
+        dataclasses.replace(free, **case, delay=delay, believed=believed)
+        for case in named
+        for delay, believed in [case.pop("delay")]
     ]
 
 

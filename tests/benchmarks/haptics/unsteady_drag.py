@@ -14,7 +14,7 @@ GLYCERIN = Liquid(id="glycerin", density_kg_m3=1261, viscosity_pa_s=1.41, drag=D
 
 
 def costs_ns(batches: int) -> tuple[float, float]:
-    """Return what the effects apart and unsteady drag take beyond a tick without effects [ns], medians of batches."""
+    """Return the extra cost of a tick with each effect and with unsteady drag [ns], medians of batches."""
     liquids = {name: GLYCERIN.model_copy(update={"effects": effects}) for name, effects in MODELS.items()}
     benches = {name: TickTimer(Scene(scale=3, liquids=(liquid,))) for name, liquid in liquids.items()}
     for _ in range(batches):

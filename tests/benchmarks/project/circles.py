@@ -44,23 +44,23 @@ def covered(folder: Path, circle: str) -> dict[str, frozenset[int]]:
     """Return the lines of the program that each test runs, as hashes."""
     data = CoverageData(str(folder / f"{circle}.coverage"))
     data.read()
-    found: dict[str, set[int]] = {}
+    covered_lines: dict[str, set[int]] = {}
     for path in data.measured_files():
         for line, names in data.contexts_by_lineno(path).items():
             for name in names:
                 if name:
-                    found.setdefault(name.split("|")[0], set()).add(hash((path, line)))
-    return {test: frozenset(lines) for test, lines in found.items()}
+                    covered_lines.setdefault(name.split("|")[0], set()).add(hash((path, line)))
+    return {test: frozenset(lines) for test, lines in covered_lines.items()}
 
 
 def collected() -> set[str]:
     """Return the names of all tests as they are now."""
     command = [sys.executable, "-m", "pytest", "--collect-only", "-q"]
-    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    return {line for line in listed.splitlines() if "::" in line}
+    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return {line for line in process.splitlines() if "::" in line}
 
 
-def chosen(tests: Covered, times_s: Mapping[str, float], known: set[int], budget_s: float) -> set[str]:
+def chosen_tests(tests: Covered, times_s: Mapping[str, float], known: set[int], budget_s: float) -> set[str]:
     """Return the tests of a circle: greedily those that add most lines to ``known`` per second, then the shortest."""
     cost = {test: max(took_s, SHORTEST_S) for test, took_s in times_s.items()}
     queue = [(-len(lines) / cost[test], test) for test, lines in tests.items()]
@@ -93,7 +93,7 @@ def chosen(tests: Covered, times_s: Mapping[str, float], known: set[int], budget
 
 
 def short(moved: set[str], stays: set[str]) -> list[str]:
-    """Return the names of tests; a module or function of which none stays is named as a whole."""
+    """Return the names of tests; name a module or function as a whole if all its tests are listed."""
     left, names = set(moved), list[str]()
     for parts in (lambda test: test.partition("::")[0], lambda test: test.partition("[")[0], str):
         partly = {parts(test) for test in stays}
@@ -109,15 +109,15 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--quick", type=float, default=54.0)
     parser.add_argument("--full", type=float, default=640.0)
-    given = parser.parse_args()
+    options = parser.parse_args()
     present = collected()
     times = {
-        circle: {test: took_s for test, took_s in durations(given.folder, circle).items() if test in present}
+        circle: {test: took_s for test, took_s in durations(options.folder, circle).items() if test in present}
         for circle in CIRCLES
     }
-    lines_of = {circle: covered(given.folder, circle) for circle in CIRCLES}
+    lines_of = {circle: covered(options.folder, circle) for circle in CIRCLES}
     lines_of["quick"] = {test: lines for test, lines in lines_of["quick"].items() if test in times["quick"]}
-    quick = chosen(lines_of["quick"], times["quick"], set(), given.quick)
+    quick = chosen_tests(lines_of["quick"], times["quick"], set(), options.quick)
     known = set[int]().union(*(lines_of["quick"].get(test, frozenset()) for test in quick))
     times_s = {test: took_s for circle in CIRCLES for test, took_s in times[circle].items() if test not in quick}
     rest = {test: lines for circle in CIRCLES for test, lines in lines_of[circle].items() if test in times_s}
@@ -125,7 +125,9 @@ def main() -> None:
     spent_s = sum(times_s[test] for test in safe)
     known = known.union(*(rest.get(test, frozenset()) for test in safe))
     others = {test: took_s for test, took_s in times_s.items() if test not in safe}
-    slow = safe | chosen({test: rest[test] for test in others if test in rest}, others, known, given.full - spent_s)
+    slow = safe | chosen_tests(
+        {test: rest[test] for test in others if test in rest}, others, known, options.full - spent_s
+    )
     nightly, every = set(times_s) - slow, times["quick"] | times["slow"]
     lines = [f"slow {name}" for name in short(slow & set(times["quick"]), quick)]
     lines += [f"nightly {name}" for name in short(nightly, quick | slow)]

@@ -109,12 +109,12 @@ class Fault(NamedTuple):
 
     @property
     def package(self) -> str:
-        """The package or single module of the program, as the tests name it."""
+        """Return the package or module of the program by which tests are grouped."""
         return Path(self.path).parts[1].removesuffix(".py")
 
 
 class Source:
-    """A module's text and places in it."""
+    """The source text of a module, and positions in it."""
 
     def __init__(self, path: Path, root: Path) -> None:
         self.path = path.relative_to(root).as_posix()
@@ -125,7 +125,7 @@ class Source:
             self._starts.append(self._starts[-1] + len(line))
 
     def span(self, node: ast.expr | ast.stmt) -> tuple[int, int]:
-        """Return the first byte of a node and the one after it."""
+        """Return the byte range of a node: its start and its end."""
         assert node.end_lineno is not None
         assert node.end_col_offset is not None
         return (
@@ -187,7 +187,10 @@ class Source:
             case ast.BinOp(left, op, right) if type(op) in SWAPPED:
                 yield "operator", (self._between(left, right, SWAPPED[type(op)]),)
             case ast.BoolOp(op, values):
-                yield "operator", tuple(self._between(one, two, SWAPPED[type(op)]) for one, two in pairwise(values))
+                yield (
+                    "operator",
+                    tuple(self._between(first, second, SWAPPED[type(op)]) for first, second in pairwise(values)),
+                )
             case ast.Compare(left, [op], [right]):
                 yield "operator", (self._between(left, right, SWAPPED[type(op)]),)
             case ast.Constant(bool(value)):
@@ -201,17 +204,21 @@ class Source:
             case ast.Expr(ast.Call()):
                 yield "call", ((*self.span(node), b"pass"),)
         arguments = node.args if isinstance(node, ast.Call) and _name_of(node.func) not in COMMUTATIVE else []
-        for one, two in pairwise(arguments):
-            if not isinstance(one, ast.Starred) and not isinstance(two, ast.Starred) and ast.dump(one) != ast.dump(two):
-                yield "argument", self._exchange(one, two)
-        for one, two in pairwise(keyword.value for keyword in getattr(node, "keywords", []) if keyword.arg):
-            if ast.dump(one) != ast.dump(two):
-                yield "keyword", self._exchange(one, two)
+        for first, second in pairwise(arguments):
+            if (
+                not isinstance(first, ast.Starred)
+                and not isinstance(second, ast.Starred)
+                and ast.dump(first) != ast.dump(second)
+            ):
+                yield "argument", self._exchange(first, second)
+        for first, second in pairwise(keyword.value for keyword in getattr(node, "keywords", []) if keyword.arg):
+            if ast.dump(first) != ast.dump(second):
+                yield "keyword", self._exchange(first, second)
         for condition in (test for loop in getattr(node, "generators", []) for test in loop.ifs):
             yield "filter", ((*self.span(condition), b"True"),)
         listed: list[Any] = node.elts if isinstance(node, ast.List | ast.Tuple) else []
-        for one, two in pairwise(node.keys if isinstance(node, ast.Dict) else listed):
-            last = [part.elts[-1] if isinstance(part, ast.Tuple) and part.elts else part for part in (one, two)]
+        for first, second in pairwise(node.keys if isinstance(node, ast.Dict) else listed):
+            last = [part.elts[-1] if isinstance(part, ast.Tuple) and part.elts else part for part in (first, second)]
             if all(isinstance(part, ast.Constant) for part in last) and ast.dump(last[0]) != ast.dump(last[1]):
                 yield "column", self._exchange(*last)
 
@@ -222,8 +229,8 @@ class Source:
         after = closing[len(closing.rstrip(b"( \n")) :]
         return begin, end, before.rstrip(b" ") + f" {operator} ".encode() + after.lstrip(b" ")
 
-    def _exchange(self, one: ast.expr, two: ast.expr) -> tuple[tuple[int, int, bytes], ...]:
-        return (*self.span(one), self.text(two)), (*self.span(two), self.text(one))
+    def _exchange(self, first: ast.expr, two: ast.expr) -> tuple[tuple[int, int, bytes], ...]:
+        return (*self.span(first), self.text(two)), (*self.span(two), self.text(first))
 
 
 def _name_of(function: ast.expr) -> str:
@@ -268,7 +275,7 @@ def apply_edits(source: bytes, edits: Iterable[tuple[int, int, bytes]]) -> bytes
 @cache
 def _faults_of_functions(root: Path, package: str) -> list[list[Fault]]:
     sources = [Source(path, root) for path in sorted((root / "study_app" / package).rglob("*.py"))]
-    return [faults for source in sources for each in source.functions() if (faults := source.faults(*each))]
+    return [faults for source in sources for function in source.functions() if (faults := source.faults(*function))]
 
 
 def draw(root: Path, count: int, seed: int, package: str) -> list[Fault]:
@@ -308,7 +315,7 @@ def _names_of_members(folder: Path) -> frozenset[str]:
 
 
 def environment_of(folder: Path, copy: Path, run: str, compiled: Path | None = None) -> dict[str, str]:
-    """Return the variables of a run of tests in a copy of the program; ``compiled`` holds what is compiled there."""
+    """Return the environment of tests in a copy of the program; ``compiled`` is its folder of compiled code."""
     return {
         "PYTHONPATH": str(copy),
         "LIQUID_STUDY_WORKSPACE": str(copy),
@@ -501,7 +508,7 @@ def _run_tests(copy: Path, tests: list[str], environment: dict[str, str], file: 
 
 
 def judge_fault(folder: Path, temporary: Path, name: str) -> dict[str, Any]:
-    """Return the circle whose tests notice a fault and how, or "none"; a test that fails without it does not count.
+    """Return the circle whose tests detect a fault and how, or "none"; ignore tests that fail without the fault.
 
     The circle is "types" if mypy reports the fault.
     """
@@ -543,7 +550,7 @@ def judge_fault(folder: Path, temporary: Path, name: str) -> dict[str, Any]:
 
 
 def check_types(copy: Path) -> bool:
-    """Return whether mypy reports something in a copy of the program; a condition `False` alone is not reported."""
+    """Return whether mypy reports an error in a copy of the program; it does not report a condition `False`."""
     command = [sys.executable, "-m", "mypy", "--no-warn-unreachable", "--no-error-summary"]
     completed = subprocess.run(command, check=False, cwd=copy, capture_output=True, text=True)
     if completed.returncode > 1:
@@ -558,7 +565,7 @@ def _own_copy(folder: Path, temporary: Path) -> Path:
 
 
 def copy_program(folder: Path, target: Path) -> Path:
-    """Copy the sound program; in the copy, one folder holds what is compiled, whatever the sources."""
+    """Copy the sound program; the copy keeps its compiled code in one folder, whatever the sources."""
     shutil.copytree(folder / "sound", target)
     module = target / "study_app" / "haptics" / "kernels" / "compiled.py"
     digest = b"digest_of(SOURCES, _processor(), versions())"
@@ -642,10 +649,10 @@ def main() -> None:
     probing.add_argument("--tests", nargs="+", default=[], help="only these folders or files")
     judging.add_argument("--workers", type=int, default=1)
     judging.add_argument("--seed", type=int)
-    given = parser.parse_args()
-    folder = given.folder.resolve()
-    if given.command == "judge":
-        judge(folder, given.workers, given.seed)
+    arguments = parser.parse_args()
+    folder = arguments.folder.resolve()
+    if arguments.command == "judge":
+        judge(folder, arguments.workers, arguments.seed)
         return
     if folder.exists():
         parser.error(f"{folder} exists already: name a new folder, or judge its faults")
@@ -653,15 +660,15 @@ def main() -> None:
     copy_work_tree(folder / "sound")
     if check_types(folder / "sound"):  # also fills mypy's cache, which the copies get
         parser.error("mypy reports faults in the program as it stands")
-    options = {"seeds": given.seeds, "functions": given.functions, "package": given.package}
+    options = {"seeds": arguments.seeds, "functions": arguments.functions, "package": arguments.package}
     (folder / "draw.json").write_bytes(json.dumps(options).encode())
-    record_tests(folder, given.tests)
+    record_tests(folder, arguments.tests)
 
 
 def copy_work_tree(folder: Path) -> None:
     """Copy what Git tracks, as it stands in the work tree."""
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    for name in listed.splitlines():
+    process = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for name in process.splitlines():
         if (ROOT / name).is_file():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, folder / name)

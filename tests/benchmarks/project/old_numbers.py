@@ -43,7 +43,7 @@ _SECTION: Final = re.compile(r"^(?=#{1,4} )", re.MULTILINE)
 
 
 class Measured(NamedTuple):
-    """A section with measured numbers: the command that it names, the code of that, and the day of the measurement."""
+    """A section with measured numbers: its command, the code of that command, and the day of measurement."""
 
     page: str
     section: str
@@ -63,15 +63,15 @@ def dates(text: str) -> Iterator[date]:
 
 def commands(text: str, top: Path) -> dict[str, tuple[str, ...]]:
     """Return the measuring commands that a text names, with the code that each measures."""
-    found: dict[str, tuple[str, ...]] = {}
+    commands_of: dict[str, tuple[str, ...]] = {}
     for words, benchmark in _COMMAND.findall(text):
         if benchmark:
             script = benchmark.removesuffix(".py").replace(".", "/") + ".py"
             if (top / script).is_file():
-                found[benchmark] = (script, *_imported(top, top / script))
+                commands_of[benchmark] = (script, *_imported(top, top / script))
         elif names := [name for name in MEASURES if f"{words} ".startswith(f"{name} ")]:
-            found[max(names, key=len)] = MEASURES[max(names, key=len)]
-    return found
+            commands_of[max(names, key=len)] = MEASURES[max(names, key=len)]
+    return commands_of
 
 
 def _imported(top: Path, script: Path) -> Iterator[str]:

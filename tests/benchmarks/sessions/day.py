@@ -41,16 +41,16 @@ MOST_RESUMED = 20
 
 
 class Killed(BaseException):
-    """The program is gone."""
+    """Raised in place of the death of the program."""
 
 
 @contextmanager
 def fails(number: int, error: BaseException, times: int = 1) -> Iterator[None]:
-    """Let the lines of a journal from one on fail so many times."""
-    append, seen = SessionStore.append, iter(range(10**9))
+    """Let a number of writes of a journal fail, starting at a line."""
+    append, append_numbers = SessionStore.append, iter(range(10**9))
 
     def failing(store: SessionStore, *words: Any, **given: Any) -> None:
-        if number <= next(seen) < number + times:
+        if number <= next(append_numbers) < number + times:
             raise error
         append(store, *words, **given)
 
@@ -69,7 +69,7 @@ def clock_moved(by: timedelta) -> Iterator[None]:
         yield
 
 
-def held(study: str, folder: Path, person: str, seed: int, fault: str, chance: random.Random) -> None:
+def hold_session(study: str, folder: Path, person: str, seed: int, fault: str, chance: random.Random) -> None:
     """Hold a session until its fault, or its end."""
     error: BaseException = StoreError("no space left") if fault == "disk full" else Killed()
     line = 10**9 if fault in ("none", "two operators", "unplugged") else chance.randrange(3, 60)
@@ -110,40 +110,39 @@ def memory_mib() -> float:
 
 
 def state() -> str:
-    held = memory_mib()
+    used_mib = memory_mib()
     gc.collect()
     ctypes.CDLL(None).malloc_trim(0)  # glibc keeps freed pages, between those in use, until it is asked
     files = len(list(Path("/proc/self/fd").iterdir()))
-    return (
-        f"{held:.0f} MiB, {memory_mib():.0f} MiB of them in use, {files} open files, {threading.active_count()} threads"
-    )
+    threads = threading.active_count()
+    return f"{used_mib:.0f} MiB, {memory_mib():.0f} MiB of them in use, {files} open files, {threads} threads"
 
 
 def main() -> None:
-    """Hold the sessions and print what was found."""
+    """Run the sessions and print the findings."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("studies", nargs="*", default=shipped())
     parser.add_argument("--sessions", type=int, default=60)
     parser.add_argument("--minutes", type=float, default=600.0, help="begin no session after so many")
     parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
-    chance, began, studies = random.Random(asked.seed), time.perf_counter(), asked.studies  # noqa: S311 - faults
+    options = parser.parse_args()
+    chance, began, studies = random.Random(options.seed), time.perf_counter(), options.studies  # noqa: S311 - faults
     faults, resumed, simulated_s = Counter[str](), 0, 0.0
     with tempfile.TemporaryDirectory() as kept:
-        for number in range(asked.sessions):
-            if time.perf_counter() - began > 60 * asked.minutes:
+        for number in range(options.sessions):
+            if time.perf_counter() - began > 60 * options.minutes:
                 break
             study, fault = studies[number % len(studies)], chance.choice(FAULTS)
             folder, person = Path(kept) / study, f"P{1 + number // len(studies):03d}"
-            held(study, folder, person, number, fault, chance)
+            hold_session(study, folder, person, number, fault, chance)
             session = StudyFolder(folder).session(person, 1)
             resumed += finish(session, fault)
-            done = progress_of(journal.read(session.journal))
-            if found := reproduce_session(session.path).differences:
-                raise AssertionError(found)
+            progress = progress_of(journal.read(session.journal))
+            if reproduction := reproduce_session(session.path).differences:
+                raise AssertionError(reproduction)
             faults[fault] += 1
-            simulated_s += done.t_s
-            if not (number + 1) % max(asked.sessions // 6, 1):
+            simulated_s += progress.t_s
+            if not (number + 1) % max(options.sessions // 6, 1):
                 sys.stdout.write(f"after {number + 1} sessions: {state()}\n")
             sys.stderr.write(f"{number} {study} {fault} {time.perf_counter() - began:.0f} s\n")
         errors = [str(error) for folder in sorted(Path(kept).iterdir()) for error in verify_study(folder).errors]

@@ -39,7 +39,7 @@ ANSWERS = 2 * 3
 
 
 class Disk:
-    """A disk that fails from the ``call`` of a kind on, once or, when it is full, for a while."""
+    """A disk that fails at a call of a kind, once, or for a while if it is full."""
 
     def __init__(self, kind: str, call: int) -> None:
         self.kind, self.happened = kind, 0
@@ -80,14 +80,14 @@ class Disk:
 
 
 def tried(act: Callable[[], Any]) -> Any:
-    """Do it as often as the disk refuses it."""
+    """Repeat an action while the disk refuses it."""
     for _ in range(MOST_TRIES):
         with suppress(StoreError):
             return act()
     raise AssertionError("the disk never took it")
 
 
-def held(folder: Path, person: str, disk: Disk) -> None:
+def hold_session(folder: Path, person: str, disk: Disk) -> None:
     """Hold a session to its end."""
     with disk.used(), mock.patch.dict(small.TABLES, SHORT):
         world = tried(lambda: StoredWorld(folder, person))
@@ -113,34 +113,34 @@ def held(folder: Path, person: str, disk: Disk) -> None:
 
 
 def main() -> None:
-    """Hold the sessions and print what was found."""
+    """Run the sessions and print the findings."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sessions", type=int, default=3000)
     parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
-    chance = random.Random(asked.seed)  # noqa: S311 - faults
+    options = parser.parse_args()
+    chance = random.Random(options.seed)  # noqa: S311 - faults
     happened, times = Counter[str](), []
     with tempfile.TemporaryDirectory() as kept:
-        for number in range(asked.sessions):
+        for number in range(options.sessions):
             began_s, disk = time.process_time(), Disk(chance.choice([*CALLS]), chance.randrange(MOST_CALL))
-            held(Path(kept, f"{number // OF_STUDY:03d}"), f"P{number % OF_STUDY + 1:03d}", disk)
+            hold_session(Path(kept, f"{number // OF_STUDY:03d}"), f"P{number % OF_STUDY + 1:03d}", disk)
             happened[disk.kind] += disk.happened > 0
             times.append(time.process_time() - began_s)
-            if not (number + 1) % max(asked.sessions // 4, 1):
+            if not (number + 1) % max(options.sessions // 4, 1):
                 sys.stdout.write(f"after {number + 1} sessions: {state()}\n")
                 sys.stdout.flush()
-        found = Findings(Path(kept))
-        for study in sorted(found.folder.iterdir()):
-            found.extend(verify_study(study))
+        findings = Findings(Path(kept))
+        for study in sorted(findings.folder.iterdir()):
+            findings.extend(verify_study(study))
     few = times[:100], times[-100:]
     listed = ", ".join(f"{count} {kind}" for kind, count in sorted(happened.items()))
     sys.stdout.write(
-        f"{asked.sessions} sessions, {happened.total()} with a fault ({listed}); a session took "
+        f"{options.sessions} sessions, {happened.total()} with a fault ({listed}); a session took "
         f"{sum(few[0]) / len(few[0]):.2f} s of CPU first, {sum(few[1]) / len(few[1]):.2f} s last; "
-        f"{len(found.errors)} errors, {len(found.warnings)} warnings\n"
+        f"{len(findings.errors)} errors, {len(findings.warnings)} warnings\n"
     )
-    sys.stdout.write("".join(f"{one}\n" for one in (*found.errors, *found.warnings)[:40]))
-    if found.errors:
+    sys.stdout.write("".join(f"{message}\n" for message in (*findings.errors, *findings.warnings)[:40]))
+    if findings.errors:
         raise SystemExit(1)
 
 

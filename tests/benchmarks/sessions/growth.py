@@ -50,8 +50,8 @@ def rehearse(folder: Path, people: int, seed: int = 1) -> None:
     study = folder.parent / "grouped.toml"
     study.write_text(STUDY + GROUPS, encoding="utf-8", newline="\n")
     protocol = grouped()
-    felt = {(block.id, name): (NO_FEATURES,) for block in protocol.blocks.values() for name in block.conditions}
-    rehearse_answers(str(study), participants=people, seed=seed, results=folder, features=felt)
+    features = {(block.id, name): (NO_FEATURES,) for block in protocol.blocks.values() for name in block.conditions}
+    rehearse_answers(str(study), participants=people, seed=seed, results=folder, features=features)
 
 
 def exclude_a_tenth(folder: Path, people: int) -> None:
@@ -71,7 +71,7 @@ def exclude_a_tenth(folder: Path, people: int) -> None:
 
 
 def cost_of(command: Callable[[], object]) -> Cost:
-    """Run a command in a fork; return what it took."""
+    """Run a command in a fork; return its time and memory."""
     reads, writes = os.pipe()
     child = os.fork()
     if child == 0:
@@ -85,8 +85,8 @@ def cost_of(command: Callable[[], object]) -> Cost:
         finally:
             os._exit(0)
     os.close(writes)
-    with os.fdopen(reads, "rb") as told:
-        content = told.read()
+    with os.fdopen(reads, "rb") as pipe:
+        content = pipe.read()
     os.waitpid(child, 0)
     return Cost(*json.loads(content))
 
@@ -126,10 +126,10 @@ def main() -> None:
         table = [costs(Path(kept, str(size)), size) for size in sizes]
     failed = False
     for name, last in table[-1].items():
-        shown = "  ".join(f"{row[name].time_s:8.2f} s {row[name].memory_mb:5.0f} MB" for row in table)
+        columns = "  ".join(f"{row[name].time_s:8.2f} s {row[name].memory_mb:5.0f} MB" for row in table)
         grown = math.log(last.time_s / table[-2][name].time_s) / math.log(sizes[-1] / sizes[-2])
         failed |= grown > MOST_EXPONENT and last.time_s > JUDGED_S
-        sys.stdout.write(f"{name:26}{shown}  exponent {grown:.2f}\n")
+        sys.stdout.write(f"{name:26}{columns}  exponent {grown:.2f}\n")
     raise SystemExit(failed)
 
 

@@ -128,7 +128,7 @@ def each(change: Callable[[str, Path, Path], object], names: tuple[str, ...] = F
 def kinds() -> dict[str, dict[str, Change]]:
     """Return for each kind of folder its changes by name."""
     texts = (b'"(operator|language)":"[^"]*"', b'"\\1":"\x1b[2J' + SCRIPT.encode() + b'"')
-    made: dict[str, dict[str, Change]] = {
+    changes: dict[str, dict[str, Change]] = {
         "HTML, script and formulas in every text": {"": lambda *_: None},
         "the same in lists": {"exclusions": lambda s, _: exclude(s, "P001", 1, by=FORMULA, reason=SCRIPT)},
         "links in place of files": each(link_file),
@@ -149,8 +149,8 @@ def kinds() -> dict[str, dict[str, Change]]:
         "journal with control characters": {"": lambda s, _: edited(s / SESSION / "journal.jsonl", *texts)},
     }
     if os.geteuid() == 0:
-        made["devices"] = each(lambda name, study, _: os.mknod(removed(study / name), 0o20666, os.makedev(1, 5)))
-    return dict(sorted(made.items(), key=lambda kind: len(kind[1])))
+        changes["devices"] = each(lambda name, study, _: os.mknod(removed(study / name), 0o20666, os.makedev(1, 5)))
+    return dict(sorted(changes.items(), key=lambda kind: len(kind[1])))
 
 
 def snapshot(folder: Path) -> dict[str, str]:
@@ -160,7 +160,7 @@ def snapshot(folder: Path) -> dict[str, str]:
 
 
 def commands(study: Path, good: Path, to: Path) -> Iterator[tuple[str, Callable[[], object]]]:
-    """Return what is done with a folder."""
+    """Yield the name and function of each command to run on a folder."""
     for name, words in {
         "verify": [study],
         "export": [study, "--to", to / "export", "--wide", "--parquet"],
@@ -170,11 +170,11 @@ def commands(study: Path, good: Path, to: Path) -> Iterator[tuple[str, Callable[
     }.items():
         sys.argv[1:] = [name, *map(str, words)]
         yield name, run_command
-    yield "watch again", lambda: watch(study / SESSION)
+    yield "watch again", lambda: open_watch_window(study / SESSION)
 
 
-def watch(session: Path) -> None:
-    """Open the window that plays a trial, and wait until it shows the trial or why it cannot."""
+def open_watch_window(session: Path) -> None:
+    """Open the window that plays a trial and wait until it shows the trial or an error."""
     from PySide6.QtTest import QTest
     from PySide6.QtWidgets import QWidget
 
@@ -184,12 +184,12 @@ def watch(session: Path) -> None:
 
     application_here()
     parent = QWidget()
-    shown = WatchWindow(parent, LIGHT, session, 1, attempt=1, presented="")
-    shown.show()
-    while shown.stage is None and shown.sentence.text() == "Reading …":
+    window = WatchWindow(parent, LIGHT, session, 1, attempt=1, presented="")
+    window.show()
+    while window.stage is None and window.sentence.text() == "Reading…":
         QTest.qWait(20)
-    print("shown" if shown.stage is not None else shown.sentence.text())
-    shown.close()
+    print("shown" if window.stage is not None else window.sentence.text())
+    window.close()
 
 
 def run_all(study: Path, good: Path, to: Path) -> list[str]:
@@ -207,8 +207,8 @@ def run_all(study: Path, good: Path, to: Path) -> list[str]:
             faults.append(f"{name}: exit code {code}{after}: {lines[-1] if lines else ''!r:.300}")
         if code == 2 and sum(line.startswith("liquid-study") for line in lines) != 1:
             faults.append(f"{name}: {text!r:.300} is not one line")
-        if found := re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\u202e]", text.replace("\r", "")):
-            faults.append(f"{name}: prints {found[0]!r} in {text[max(found.start() - 80, 0) : found.end() + 20]!r}")
+        if match := re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\u202e]", text.replace("\r", "")):
+            faults.append(f"{name}: prints {match[0]!r} in {text[max(match.start() - 80, 0) : match.end() + 20]!r}")
     return faults
 
 
@@ -238,7 +238,7 @@ def _run_in_child(run: Callable[[], object], said: Path) -> None:
 
 
 def unescaped(to: Path) -> list[str]:
-    """Return what outputs contain that a browser or a spreadsheet would run, and secrets of this computer."""
+    """Return texts in outputs that a browser or a spreadsheet would run, and secrets of this computer."""
     faults = []
     for path in to.rglob("*"):
         if path.suffix == ".html" and re.search(r"<script>alert|<img src=x", path.read_text("utf-8")):

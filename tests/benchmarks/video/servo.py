@@ -60,7 +60,7 @@ class Segment:
             footage.rewind()
 
     def paint(self) -> None:
-        """Paint a frame as a session does, and take what was seen of the video."""
+        """Paint a frame like a session, and record the video frame."""
         began = time.perf_counter()
         drawn_ns = self.servo.now_ns() - round((self.delay_s + SETTLED_S) * 1e9)
         position_m, shown_ns = self.servo.telemetry.position_at(drawn_ns)
@@ -112,12 +112,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=8)
     parser.add_argument("--seconds", type=float, default=6.0)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     QApplication.instance() or QApplication([])
     widget = TankWidget(task_page(follow()), words("en"))
     widget.resize(1920, 1080)
     widget.show()
-    found: dict[str, list[Any]] = {"without": [], "with": []}
+    times_ns: dict[str, list[Any]] = {"without": [], "with": []}
     errors_ns: dict[float, list[int]] = {delay_s: [] for delay_s in DELAYS_S}
     choices_ns: list[int] = []
     gaps_ns: list[int] = []
@@ -128,12 +128,12 @@ def main() -> None:
         clip = Path(folder) / "clip.mp4"
         write_clip(clip, frames=5 * RATE_HZ)
         footage = Footage(clip)
-        for number in range(asked.rounds):
+        for number in range(options.rounds):
             names = ("without", "with") if number % 2 == 0 else ("with", "without")
             for name in names:
                 delay_s = DELAYS_S[number // 2 % len(DELAYS_S)]
                 segment = Segment(servo, widget, footage if name == "with" else None, delay_s)
-                found[name].append(segment.run(asked.seconds))
+                times_ns[name].append(segment.run(options.seconds))
                 painting_ms[name].append(1e3 * segment.painting_s / segment.frames)
                 if name == "with":
                     errors_ns[delay_s] += segment.errors_ns
@@ -144,15 +144,17 @@ def main() -> None:
                     frames += columns["video_frames"]
         footage.close()
         priority = servo.describe()["priority"]
-    print(f"footage {SIZE[0]} x {SIZE[1]} at {RATE_HZ} Hz, {asked.rounds} rounds of {asked.seconds:g} s; {priority}")
+    print(
+        f"footage {SIZE[0]} x {SIZE[1]} at {RATE_HZ} Hz, {options.rounds} rounds of {options.seconds:g} s; {priority}"
+    )
     print(f"{'lateness of ticks':<20}{'p50 us':>9}{'p99 us':>9}{'paint ms':>10}")
-    for name, segments in found.items():
-        middle, high = (np.median([np.percentile(one, q) for one in segments]) / 1e3 for q in (50, 99))
+    for name, segments in times_ns.items():
+        middle, high = (np.median([np.percentile(segment, q) for segment in segments]) / 1e3 for q in (50, 99))
         print(f"{name + ' a video':<20}{middle:>9.1f}{high:>9.1f}{np.median(painting_ms[name]):>10.2f}")
     for q in (50, 99):
         values = [
-            np.percentile(one, q) / np.percentile(other, q)
-            for one, other in zip(found["with"], found["without"], strict=True)
+            np.percentile(times_with, q) / np.percentile(times_without, q)
+            for times_with, times_without in zip(times_ns["with"], times_ns["without"], strict=True)
         ]
         print(f"ratio of p{q}, with to without: {interval(values)}")
     period_ns = 1e9 / RATE_HZ

@@ -32,22 +32,22 @@ STARTS = {
 
 def distributions(names: list[str]) -> set[str]:
     """Return the names of distributions and of all that they need here."""
-    found: set[str] = set()
+    included: set[str] = set()
     while names:
         name = names.pop().lower().replace("_", "-")
-        if name in found:
+        if name in included:
             continue
         try:
             needed = distribution(name).requires or []
         except PackageNotFoundError:  # of another system
             continue
-        found.add(name)
+        included.add(name)
         names += [re.match(r"[\w.-]+", line).group() for line in needed if "extra ==" not in line]  # type: ignore[union-attr]
-    return found
+    return included
 
 
 def requirements() -> list[str]:
-    """Return what the program and its extra ``analysis`` need."""
+    """Return the requirements of the program and its extra ``analysis``."""
     import tomllib
 
     with (ROOT / "pyproject.toml").open("rb") as file:
@@ -67,7 +67,7 @@ def plain_bytes() -> int:
     return sum(path.stat().st_size for path in (*files, *own, *python) if path.is_file())
 
 
-def started(command: list[str], environment: dict[str, str]) -> tuple[float, float]:
+def run_timed(command: list[str], environment: dict[str, str]) -> tuple[float, float]:
     """Run a command; return its time of a core and its time in all [s]."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL, cwd=ROOT)
@@ -90,7 +90,7 @@ def main() -> None:
         for title, words in STARTS.items():
             plain = [sys.executable, *words] if words[0] == "-c" else [sys.executable, "-m", "study_app", *words]
             times = [
-                (started([str(bundle / "liquid-study"), *words], environment), started(plain, environment))
+                (run_timed([str(bundle / "liquid-study"), *words], environment), run_timed(plain, environment))
                 for _ in range(ROUNDS)
             ]
             cells = [

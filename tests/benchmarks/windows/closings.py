@@ -143,7 +143,7 @@ class Case:
         return False
 
     def check_force_soon(self) -> None:
-        """Check `SOON_S` later, before the session goes on, that the device exerts no force."""
+        """Check `SOON_S` later, before the session continues, that the device exerts no force."""
 
         def check(*_windows: object) -> bool:
             if time.perf_counter() > self.acted_s + SOON_S:
@@ -154,8 +154,8 @@ class Case:
         self.next = check
 
     def _end_hung(self) -> None:
-        shown = window(ParticipantWindow)
-        self.faults.append(f"{self.phase}: hung at {shown and shown.page!r:.60}")
+        participant_window = window(ParticipantWindow)
+        self.faults.append(f"{self.phase}: hung at {participant_window and participant_window.page!r:.60}")
         os.kill(os.getpid(), signal.SIGTERM)
 
     def _is_pushed(self) -> bool:
@@ -193,13 +193,16 @@ class Case:
             ended = self.run(lambda: resume(sessions[0].path, protocol=str(STUDY), **where))
             self.check(sessions[0].journal.read_bytes().startswith(before), "lines of the journal changed")
         lines = journal.read(sessions[0].journal)
-        given = Counter(
+        answer_counts = Counter(
             (line.fields().get("trial"), line.fields().get("form"), item["item"])
             for line in lines
             if line.event in ("responses", "form_answered")
             for item in line.fields()["items"]
         )
-        self.check(len(given) == given.total() == ANSWERS, f"{given.total()} answers, {len(given)} different")
+        self.check(
+            len(answer_counts) == answer_counts.total() == ANSWERS,
+            f"{answer_counts.total()} answers, {len(answer_counts)} different",
+        )
         self.check(lines[-1].fields().get("status") == "completed", f"the last line is {lines[-1].fields()}: {ended}")
 
 
@@ -240,7 +243,7 @@ def close_dialog(name: str, case: Case, _participant: ParticipantWindow, operato
     for dialog in operator.findChildren(QDialog):
         if dialog.isVisible():
             dialog.windowHandle().close()
-    case.check(not [one for one in operator.findChildren(QDialog) if one.isVisible()], f"{name} stays open")
+    case.check(not [dialog for dialog in operator.findChildren(QDialog) if dialog.isVisible()], f"{name} stays open")
 
 
 # Painters that fail.
@@ -274,18 +277,18 @@ def _set_permissions(folder: Path, kind: str, *, writable: bool) -> None:
 
 def start_when_asked() -> None:
     """Press Start in the window of the pre-flight."""
-    asked = window(PreflightWindow)
-    if asked is not None and asked.start.isEnabled():
-        asked.start.click()
+    preflight_window = window(PreflightWindow)
+    if preflight_window is not None and preflight_window.start.isEnabled():
+        preflight_window.start.click()
 
 
 def close_while_starting(kind: type[QWidget], folder: Path) -> list[str]:
-    """Close a window that is shown before a session; return what is wrong afterwards."""
+    """Close a window that is shown before a session; return the faults afterwards."""
     closed: list[bool] = []
 
     def look() -> None:
-        if (shown := window(kind)) is not None and not closed:
-            closed.append(shown.windowHandle().close())
+        if (window_found := window(kind)) is not None and not closed:
+            closed.append(window_found.windowHandle().close())
 
     with every_20_ms(look):
         code = run(str(STUDY), participant="P001", device="falcon-emulated", windowed=True, results=folder)

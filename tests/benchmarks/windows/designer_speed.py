@@ -33,7 +33,7 @@ ITEM = ("questionnaires", "liquid", "items", 3)
 
 
 def timed(act: Callable[[], object], paint: Callable[[], None] = QApplication.processEvents) -> tuple[float, float]:
-    """Return how long an act takes until what it changed is painted: wall and CPU time [ms].
+    """Return the wall and CPU time [ms] until the change by an act is painted.
 
     `QApplication.sendPostedEvents` as ``paint`` paints what is changed at once, without what timers do afterwards.
     """
@@ -45,9 +45,9 @@ def timed(act: Callable[[], object], paint: Callable[[], None] = QApplication.pr
 
 def grown(text: str) -> str:
     """Return a study with many questionnaires of its own, which no block asks."""
-    found = re.search(r"(?ms)^\[questionnaires\.liquid\].*?(?=^\[(?!\[)[a-z]+\.(?!liquid))", text)
-    assert found is not None
-    copies = [found[0].replace("questionnaires.liquid", f"questionnaires.copy_{at}") for at in range(COPIES)]
+    match = re.search(r"(?ms)^\[questionnaires\.liquid\].*?(?=^\[(?!\[)[a-z]+\.(?!liquid))", text)
+    assert match is not None
+    copies = [match[0].replace("questionnaires.liquid", f"questionnaires.copy_{at}") for at in range(COPIES)]
     return text + "\n" + "\n".join(copies)
 
 
@@ -91,7 +91,7 @@ def main(edits: int = 60) -> None:
         rows.append(("selection in outline → form painted", "50", selected))
         controller.editing.select(ITEM)
         QTest.qWait(500)
-        row = next(one for one in controller.place.form.rows if one.row.path == (*ITEM, "text"))
+        row = next(row for row in controller.place.form.rows if row.row.path == (*ITEM, "text"))
         field = (row.field.findChildren(QLineEdit) or row.field.findChildren(QPlainTextEdit))[0]
         field.setFocus()
         keys = []

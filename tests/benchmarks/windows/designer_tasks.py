@@ -51,8 +51,8 @@ class Tasks:
 
     def header(self) -> DesignerHeader:
         """Return the header of the designer."""
-        (found,) = self.user.window.findChildren(DesignerHeader)
-        return found
+        (headers,) = self.user.window.findChildren(DesignerHeader)
+        return headers
 
     def document(self, name: str) -> dict[str, object]:
         """Return the draft or the file of a study."""
@@ -63,7 +63,7 @@ class Tasks:
     def template(self) -> None:
         """A study from "Compare liquids" with its own title and a second language, saved."""
         user = self.user
-        user.press("New study …*")
+        user.press("New study…*")
         user.write("Title", "Three drinks", accept=False)
         user.press("Language Dutch")
         user.press("Make study")
@@ -80,9 +80,9 @@ class Tasks:
         wait_until(lambda: "drinken" in str(self.document("threedrinks")["questionnaires"]), "the text")
 
     def delays(self) -> None:
-        """Delays of 0, 60, 120 and 240 ms in a Williams design, and how many participants balance it."""
+        """Create delays of 0, 60, 120 and 240 ms in a Williams design, and read the balanced sample size."""
         user = self.user
-        user.choose("Study", "New study …")
+        user.choose("Study", "New study…")
         user.press("Template Empty study")
         user.write("Title", "Four delays", accept=False)
         user.press("Make study")
@@ -94,17 +94,19 @@ class Tasks:
         user.choose("Order", "Williams")
         QTest.qWait(1500)
         words = [label.text() for label in user.window.findChildren(QLabel) if label.isVisible()]
-        assert any("12 participants complete 3 rounds of 4" in one for one in words), words
+        assert any("12 participants complete 3 rounds of 4" in label_text for label_text in words), words
 
     def changes(self) -> None:
         """What differs from the version that was saved."""
         self.user.choose("Study", "Three drinks  ·  threedrinks.toml")
         self.user.choose("Study view", "Changes")
         texts = self.user.window.findChildren(QPlainTextEdit)
-        wait_until(lambda: any(it.toPlainText() for it in texts if it.accessibleName() == "Differences"), "differences")
+        wait_until(
+            lambda: any(text.toPlainText() for text in texts if text.accessibleName() == "Differences"), "differences"
+        )
 
     def rename(self) -> None:
-        """A liquid renamed, another one deleted with all that needs it, both undone."""
+        """Rename a liquid, delete another one with its dependents, and undo both."""
         user = self.user
         user.select("Water", "Liquids")
         user.write("ID", "sea")
@@ -117,7 +119,7 @@ class Tasks:
         assert {"water", "honey"} <= set(self.document("threedrinks")["liquids"])  # type: ignore[call-overload]
 
     def faults(self) -> None:
-        """A file with five faults made valid."""
+        """Repair a file with five faults."""
         user = self.user
         user.choose("Study", "A first look  ·  faulty.toml")
         wait_until(lambda: self.header().problems.chip_text == f"{len(FAULTS)} problems", "the problems")
@@ -129,9 +131,9 @@ class Tasks:
             if self.header().problems.chip_text.startswith("No") or "warning" in self.header().problems.chip_text:
                 break
             offered = lambda: [  # noqa: E731 - looked for anew
-                one
-                for one in card.findChildren(ActionButton)
-                if one.isVisible() and one.isEnabled() and ": " in one.accessibleName()
+                button
+                for button in card.findChildren(ActionButton)
+                if button.isVisible() and button.isEnabled() and ": " in button.accessibleName()
             ]
             wait_until(offered, "a repair", 60_000)
             user.press(name_of(offered()[0]))
@@ -144,7 +146,7 @@ class Tasks:
         user = self.user
         if isinstance(user, KeyUser):
             user.key("ctrl+5")
-        user.choose("Study", "New study …")
+        user.choose("Study", "New study…")
         user.press("Template Viscosity JND")
         user.write("Title", "Thicker", accept=False)
         user.press("Make study")
@@ -194,7 +196,7 @@ def act_tasks(kind: str, folder: Path, *numbers: str) -> None:
 
 
 def act_killed(kind: str, folder: Path) -> None:
-    """Type into a study, and say so; the process is killed then."""
+    """Type into a study and report it; the process is then killed."""
 
     def act(user: User) -> None:
         begin(user, "Empty study", "Killed")
@@ -254,8 +256,8 @@ def main(numbers: Sequence[int]) -> None:
                     print(f"{act} by {kind}: the program ended with exit code {process.returncode}", file=sys.stderr)
     print("| task | keys | mouse |")
     print("| --- | --- | --- |")
-    for task, found in counts.items():
-        print(f"| {task.rstrip('.')} | {found.get('keys', '–')} | {found.get('mouse', '–')} |")
+    for task, task_counts in counts.items():
+        print(f"| {task.rstrip('.')} | {task_counts.get('keys', '–')} | {task_counts.get('mouse', '–')} |")
 
 
 if __name__ == "__main__":

@@ -34,13 +34,13 @@ def first_force(program: str) -> tuple[float, float, int]:
         names = ("NUMBA_CACHE_DIR", "LIQUID_STUDY_CONFIG", "LIQUID_STUDY_WORKSPACE")
         environment = os.environ | dict.fromkeys(names, folder)
         before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        done = subprocess.run(
+        process = subprocess.run(
             [program, "-c", FIRST_FORCE], env=environment, cwd=folder, check=True, stdout=subprocess.PIPE, text=True
         )
         took_s = time.perf_counter() - began
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     core_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return took_s, core_s, int(done.stdout.split()[1])
+    return took_s, core_s, int(process.stdout.split()[1])
 
 
 def main() -> None:
@@ -48,9 +48,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("programs", nargs="+", help="a Python with the program installed, or the bundle's program")
     parser.add_argument("--runs", type=int, default=3)
-    asked = parser.parse_args()
-    for program in asked.programs:
-        runs = [first_force(str(Path(program).absolute())) for _ in range(asked.runs)]
+    options = parser.parse_args()
+    for program in options.programs:
+        runs = [first_force(str(Path(program).absolute())) for _ in range(options.runs)]
         took_s, core_s, compiled = (min(values) for values in zip(*runs, strict=True))
         sys.stdout.write(f"{took_s:.1f} s, {core_s:.1f} s of a core, {compiled} functions compiled: {program}\n")
 

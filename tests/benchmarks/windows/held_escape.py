@@ -15,8 +15,8 @@ def main() -> None:
     print("| where | key repeat | force stopped |\n| --- | --- | --- |")
     for name, bench in (("session", SessionBench), ("lab", LabBench)):
         for delay_ms in DELAYS_MS:
-            with tempfile.TemporaryDirectory() as folder, opened_bench(bench, Path(folder)) as opened:
-                stops = count_stops(opened, delay_ms, attempts)
+            with tempfile.TemporaryDirectory() as folder, opened_bench(bench, Path(folder)) as escape_bench:
+                stops = count_stops(escape_bench, delay_ms, attempts)
             repeat = "off" if delay_ms is None else f"{delay_ms} ms"
             print(f"| {name} | {repeat} | {stops} of {attempts} |", flush=True)
 

@@ -64,7 +64,7 @@ SETTLED_TICKS: Final = 60
 
 
 class Painting:
-    """Notes where each painting method of the program is first called, and lets one of them fail once."""
+    """Record where each painting method of the program is first called, and let one of them fail once."""
 
     def __init__(self) -> None:
         self.breaks: set[str] = set()  # classes whose next call fails
@@ -107,7 +107,7 @@ class Painting:
 
 
 class PaintersCase(Case):
-    """A session in which each painter fails once, in its phase; what stops it, leaves it, and it is resumed."""
+    """A session in which each painter fails once in its phase; a stopped session is left and resumed."""
 
     def __init__(self, folder: Path, painting: Painting, painters: dict[str, str]) -> None:
         super().__init__(folder, painters.values(), self._break_next)
@@ -167,7 +167,7 @@ class PaintersCase(Case):
 
 
 def tour(study: Path, painting: Painting, faults: dict[str, list[str]]) -> None:
-    """Visit the pages of the main window, and break each of the painters that are seen there."""
+    """Visit the pages of the main window, and let each painter on them fail once."""
     before = set(painting.phases)
 
     def visit(controller: main_controller.MainController) -> None:
@@ -199,14 +199,14 @@ def _views(controller: main_controller.MainController, study: Path) -> Iterator[
     controller.begin_new_study()
     yield "new study"
     controller.show_study(study)
-    shown = controller.results_place
-    assert shown is not None
-    while not shown.view.sessions:  # they are read in another process
+    view = controller.results_place
+    assert view is not None
+    while not view.view.sessions:  # they are read in another process
         yield "results, study"
-    shown.sessions.rows.opened.emit(shown.view.sessions[0])
+    view.sessions.rows.opened.emit(view.view.sessions[0])
     yield "session"
-    assert isinstance(shown.dialog, SessionPage)
-    shown.dialog.watch.click()
+    assert isinstance(view.dialog, SessionPage)
+    view.dialog.watch.click()
     yield "watch again"
     controller.window.go("machine")
     controller._test_display()
@@ -256,8 +256,8 @@ def _tour_steps(
             if painting.breaks:
                 painting.breaks.clear()  # it was shown for a moment only
                 continue
-            told = any(name in bug for bug in controller._bugs)
-            faults[name] = [] if told else [f"{painting.phase}: the exception in {name} is not told"]
+            has_bug = any(name in bug for bug in controller._bugs)
+            faults[name] = [] if has_bug else [f"{painting.phase}: the exception in {name} is not told"]
             for box in controller.window.findChildren(Question):
                 box.close()
 
@@ -272,14 +272,18 @@ def run_painters(folder: Path, tell: Tell) -> None:
     painting.install()
     with every_20_ms(start_when_asked):
         PaintersCase(folder / "dry", painting, {}).hold()
-        seen = {name: set(phases) for name, phases in painting.phases.items()}
-        opening = {name for name, phases in seen.items() if "opening" in phases}
+        painted_phases = {name: set(phases) for name, phases in painting.phases.items()}
+        opening = {name for name, phases in painted_phases.items() if "opening" in phases}
         case = PaintersCase(folder / "opening", painting, {})
         painting.breaks = set(opening)
         case.hold()
         tell("broken while a session is opened", len(opening - painting.breaks), case.faults)
         painting.breaks.clear()
-        due = {name: phase for name, phases in seen.items() for phase in sorted(phases & set(PAINTED), key=_rank)[:1]}
+        due = {
+            name: phase
+            for name, phases in painted_phases.items()
+            for phase in sorted(phases & set(PAINTED), key=_rank)[:1]
+        }
         for number in range(MOST_SESSIONS):
             case = PaintersCase(folder / f"session-{number}", painting, due)
             case.hold()
@@ -289,8 +293,10 @@ def run_painters(folder: Path, tell: Tell) -> None:
     api.unblind(folder / "dry" / "results", by="AK", reason="watching a trial again")
     toured: dict[str, list[str]] = {}
     tour(folder / "dry" / "results", painting, toured)
-    tell("broken on a page of the main window", len(toured), [one for wrong in toured.values() for one in wrong])
-    left = {name for name in painting.names - seen.keys() - toured.keys() if name.startswith("study_app")}
+    tell(
+        "broken on a page of the main window", len(toured), [message for wrong in toured.values() for message in wrong]
+    )
+    left = {name for name in painting.names - painted_phases.keys() - toured.keys() if name.startswith("study_app")}
     print(f"{len(left)} painters were not seen: {', '.join(sorted(left))}")
 
 

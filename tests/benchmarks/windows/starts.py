@@ -68,14 +68,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--starts", type=int, default=300)
     parser.add_argument("--kind", choices=KINDS, action="append", help="only this kind; without it, all in turn")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     surroundings = dict(os.environ)
     if not surroundings.get("DISPLAY") and not surroundings.get("WAYLAND_DISPLAY"):
         surroundings["QT_QPA_PLATFORM"] = "offscreen"
     ends: Counter[tuple[str, str]] = Counter()
     began = time.perf_counter()
     with suppress(KeyboardInterrupt):  # Ctrl+C prints what there is
-        count(asked.starts, asked.kind or list(KINDS), surroundings, ends)
+        count(options.starts, options.kind or list(KINDS), surroundings, ends)
     print(f"{ends.total()} starts in {(time.perf_counter() - began) / 60:.0f} min\n\n| started | ended | times |")
     print("| --- | --- | --: |")
     for (kind, how), times in sorted(ends.items()):
@@ -99,7 +99,7 @@ def count(starts: int, kinds: list[str], surroundings: dict[str, str], ends: Cou
 
 
 def said_until_its_end(program: subprocess.Popen[str]) -> str:
-    """Return what a program said; one that hangs is aborted, and then says where each of its threads stands.
+    """Return the output of a program; abort it if it hangs, so that it prints the stacks of its threads.
 
     A busy computer makes no start hang: what counts is a time without any progress, or the program's own time.
     """

@@ -66,14 +66,14 @@ DEAREST = 10
 
 def environment() -> dict[str, str]:
     """Return the surroundings that the program is started in."""
-    found = dict(os.environ)
-    if not found.get("DISPLAY") and not found.get("WAYLAND_DISPLAY"):
-        found["QT_QPA_PLATFORM"] = "offscreen"
-    return found
+    variables = dict(os.environ)
+    if not variables.get("DISPLAY") and not variables.get("WAYLAND_DISPLAY"):
+        variables["QT_QPA_PLATFORM"] = "offscreen"
+    return variables
 
 
 def once(kind: str, *options: str) -> tuple[dict[str, float], str]:
-    """Start the program once; return the seconds until it had answered or shown each window, and its errors."""
+    """Start the program once; return the seconds until its answer or each window, and its errors."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, *options]
         if kind == "help":
@@ -81,18 +81,18 @@ def once(kind: str, *options: str) -> tuple[dict[str, float], str]:
         else:
             command += ["-c", PROBE, kind, ",".join(WINDOWS[kind]), str(Path(folder) / "demo")]
         began = time.time()
-        done = subprocess.run(command, capture_output=True, text=True, env=environment(), check=False, timeout=60)
+        process = subprocess.run(command, capture_output=True, text=True, env=environment(), check=False, timeout=60)
         ended = time.time()
     if kind == "help":
-        return {"help": ended - began}, done.stderr
-    seen = [line.split() for line in done.stdout.splitlines() if line.startswith("VISIBLE")]
-    if len(seen) != len(WINDOWS[kind]):
-        sys.exit(f"{kind}: saw {[name for _, name, _ in seen]} of {WINDOWS[kind]}\n{done.stderr}")
-    return {name: float(at) - began for _, name, at in seen}, done.stderr
+        return {"help": ended - began}, process.stderr
+    visible_lines = [line.split() for line in process.stdout.splitlines() if line.startswith("VISIBLE")]
+    if len(visible_lines) != len(WINDOWS[kind]):
+        sys.exit(f"{kind}: saw {[name for _, name, _ in visible_lines]} of {WINDOWS[kind]}\n{process.stderr}")
+    return {name: float(at) - began for _, name, at in visible_lines}, process.stderr
 
 
 def dearest(kind: str) -> list[tuple[str, float, float]]:
-    """Return the modules that took longest until the program stood: name, by itself and with what it loads [ms]."""
+    """Return the modules with the longest import: name, own time and cumulative time [ms]."""
     _, said = once(kind, "-X", "importtime")
     rows = []
     for line in said.splitlines():
@@ -113,7 +113,7 @@ def main() -> None:
         once(kind)  # the first may compile
         times = [once(kind)[0] for _ in range(runs)]
         for name in times[0]:
-            seconds = [one[name] for one in times]
+            seconds = [start_times[name] for start_times in times]
             limit = f"{LIMITS_S[name]:g} s" if name in LIMITS_S else ""
             print(f"| {NAMES[name]} | {statistics.median(seconds):.2f} s | {max(seconds):.2f} s | {limit} |")
     tables = {kind: dearest(kind) for kind in ("help", *WINDOWS)}

@@ -96,7 +96,7 @@ kind = "break"'''
 
 def texts() -> dict[str, str]:
     """Return every protocol of the repository and the grown study, also with other line ends, by name."""
-    found = {path.stem: path.read_bytes().decode() for path in sorted(PROTOCOLS.glob("*.toml"))}
-    found |= {"grown": GROWN, "grown with a last line break": GROWN + "\n"}
-    windows = {f"{name}, \\r\\n": found[name].replace("\n", "\r\n") for name in ("grown", "demo", "delaydetect")}
-    return found | windows | {"empty": "", "one comment": "# nothing yet", "one key": "format = 2"}
+    protocols = {path.stem: path.read_bytes().decode() for path in sorted(PROTOCOLS.glob("*.toml"))}
+    protocols |= {"grown": GROWN, "grown with a last line break": GROWN + "\n"}
+    windows = {f"{name}, \\r\\n": protocols[name].replace("\n", "\r\n") for name in ("grown", "demo", "delaydetect")}
+    return protocols | windows | {"empty": "", "one comment": "# nothing yet", "one key": "format = 2"}

@@ -1,4 +1,4 @@
-"""Random edits of a text, and what must hold after each: found in other ways than the writer does.
+"""Random edits of a text, and checks after each that are independent of the writer.
 
 The document is the one that is meant; no other value is written in another way; comments stay with what they belong to.
 """
@@ -34,13 +34,13 @@ FREE: Path = ("(free)",)
 
 
 def owners(text: str) -> Counter[tuple[Path, str]]:
-    """Return the comments of a text with the path that each belongs to, `FREE` where it belongs to nothing."""
+    """Count the comments of a text by their owner's path, or `FREE` without an owner, and their text."""
     nodes = scan_nodes(text)
-    found: Counter[tuple[Path, str]] = Counter()
+    comments: Counter[tuple[Path, str]] = Counter()
     for match in _TOKENS.finditer(text):
         if match["comment"]:
-            found[_owner(text, nodes, match.start()), match["comment"].rstrip()] += 1
-    return found
+            comments[_owner(text, nodes, match.start()), match["comment"].rstrip()] += 1
+    return comments
 
 
 def _owner(text: str, nodes: tuple[Node, ...], at: int) -> Path:
@@ -88,18 +88,18 @@ def value_of(random: Random, depth: int = 0) -> Any:
 def paths(node: Any, path: Path = ()) -> list[Path]:
     """Return the paths of everything in a document."""
     inner = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
-    return [found for key, value in inner for found in ((*path, key), *paths(value, (*path, key)))]
+    return [inner_path for key, value in inner for inner_path in ((*path, key), *paths(value, (*path, key)))]
 
 
 def at(document: Any, path: Path) -> Any:
-    """Return what is at a path of a document."""
+    """Return the value at a path of a document."""
     for step in path:
         document = document[step]
     return document
 
 
 def edit_of(random: Random, text: str) -> Edit:
-    """Return a random edit of a text, every second one of what has comments; it may be one that makes no sense."""
+    """Return a random edit of a text, which may be invalid; every second one concerns keys with comments."""
     document = tomllib.loads(text)
     known = paths(document)
     commented = [path for path, _ in owners(text) if path in known and random.random() < 0.5]
@@ -114,7 +114,9 @@ def edit_of(random: Random, text: str) -> Edit:
     if several:
         choices += [Insert(path, new), Move(path, random.randrange(len(parent)))]
     else:
-        naming = tuple(one for one in known if at(document, one) == path[-1] and one[: len(path)] != path)
+        naming = tuple(
+            reference for reference in known if at(document, reference) == path[-1] and reference[: len(path)] != path
+        )
         choices += [Rename(path, name, naming), Set((*path[:-1], name), new, random.choice([None, path[-1]]))]
     if isinstance(value, dict):
         choices += [Set((*path, name), new, random.choice([None, *value])), Set((*path, name, "inner"), new)]
@@ -123,8 +125,8 @@ def edit_of(random: Random, text: str) -> Edit:
     return random.choice(choices)
 
 
-def renumbered(path: Path, edit: Edit) -> Path | None:
-    """Return where a path of the text before an edit is after it; None where the edit may touch its comments."""
+def path_after(path: Path, edit: Edit) -> Path | None:
+    """Return the path after an edit, or None if the edit may affect its comments."""
     at_, depth = edit.path, len(edit.path) - 1
     if path[:depth] != at_[:depth] or len(path) <= depth:
         return path
@@ -147,16 +149,16 @@ def renumbered(path: Path, edit: Edit) -> Path | None:
 
 
 def check_comments(before: str, after: str, edit: Edit) -> None:
-    """Check that each comment is where what it belongs to is."""
+    """Check that each comment has moved with its owner."""
     old, new = owners(before), owners(after)
     for (path, comment), count in old.items():
         if path == FREE:
             continue
-        moved = renumbered(path, edit)
+        moved = path_after(path, edit)
         if moved is not None:
             assert new[moved, comment] >= count, (path, moved, comment)
         elif isinstance(edit, Unset):
-            everywhere = [sum(n for (_, words), n in one.items() if words == comment) for one in (old, new)]
+            everywhere = [sum(n for (_, words), n in comments.items() if words == comment) for comments in (old, new)]
             assert everywhere[1] <= everywhere[0] - count, (path, comment)
         if isinstance(edit, Duplicate) and path[: len(edit.path)] == edit.path:
             last = edit.path[-1]
@@ -169,18 +171,18 @@ def check_comments(before: str, after: str, edit: Edit) -> None:
 
 
 def values_of(text: str) -> dict[Path, str]:
-    """Return how each value that holds no other one is written."""
+    """Return the notation of each scalar value."""
     nodes = [node for node in scan_nodes(text) if node.kind in {"key", "pair", "entry"}]
     inner = {node.path[:length] for node in nodes for length in range(len(node.path))}
     return {node.path: text[node.value : node.end] for node in nodes if node.path not in inner}
 
 
 def unmeant_changes(before: str, after: str, edit: Edit) -> list[Path]:
-    """Return the values that an edit does not concern and that are written in another way after it."""
+    """Return the values that an edit does not concern but whose notation changed."""
     old, new = values_of(before), values_of(after)
     concerned = {edit.path[:length] for length in range(len(edit.path))}
     concerned |= set(edit.references) if isinstance(edit, Rename) else set()
-    places = {path: renumbered(path, edit) for path in old if path not in concerned}
+    places = {path: path_after(path, edit) for path in old if path not in concerned}
     return [path for path, place in places.items() if place is not None and new.get(place) != old[path]]
 
 

@@ -59,7 +59,7 @@ def things(document: Any) -> list[Path]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_renamed_leaves_no_reference_and_no_session_changed(name: str) -> None:
+def test_renaming_updates_every_reference_and_leaves_sessions_unchanged(name: str) -> None:
     study = study_of(name)
     for thing in things(study.document)[::4]:
         if thing[0] in {"designs", "methods"} or (len(thing) == 4 and "instrument" in str(study.document[thing[0]])):
@@ -67,7 +67,7 @@ def test_renamed_leaves_no_reference_and_no_session_changed(name: str) -> None:
         changed, _ = study.with_edits(*edits_to_rename(study.document, thing, "quite_other"))
         assert changed.protocol is not None, (thing, changed.problems)
         assert study.protocol is not None
-        before, after = (build_schedule(one.protocol, "P001", 1).steps for one in (study, changed))
+        before, after = (build_schedule(version.protocol, "P001", 1).steps for version in (study, changed))
         assert [type(step) for step in before] == [type(step) for step in after]
         if thing[0] in {"liquids", "conditions", "tasks", "scales", "pages"}:  # other names are those of random streams
             named = repr(before).replace(f"'{thing[1]}'", "'quite_other'")
@@ -92,13 +92,13 @@ def _name(document: Any, thing: Path) -> Any:
     ("thing", "place"), [(("tasks", "reach"), ("blocks", "delay", "task")),
                          (("liquids", "water"), ("stimuli", "delay", "condition"))],
 )  # fmt: skip
-def test_what_leaves_the_name_of_the_only_one_out_goes_with_it(thing: Path, place: Path) -> None:
+def test_elements_that_imply_the_only_element_are_deleted_with_it(thing: Path, place: Path) -> None:
     study = study_of("delayjnd")
     assert orphaned_keys(study.document, [thing]) == (place,)
     assert place[:2] in paths_to_delete(study.document, thing, study.is_required)
 
 
-def test_the_only_condition_leaves_its_liquid_to_what_leaves_its_name_out() -> None:
+def test_elements_that_imply_the_only_condition_fall_back_to_its_liquid() -> None:
     study = study_of("delaydetect")
     condition, liquid = ("conditions", "water"), ("liquids", "water")
     assert orphaned_keys(study.document, [condition]) == ()
@@ -109,7 +109,7 @@ def test_the_only_condition_leaves_its_liquid_to_what_leaves_its_name_out() -> N
     assert {condition, ("stimuli", "delay")} <= {*paths_to_delete(study.document, liquid, study.is_required)}
 
 
-def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
+def test_liquids_are_called_conditions_in_a_study_without_conditions() -> None:
     text = re.sub(r"\[conditions\.\w+\]\n(?:\w+ = .*\n)+", "", (FOLDER / "compare-liquids.toml").read_text("utf-8"))
     study = read_study(text.replace('conditions = ["practice"]', 'conditions = ["syrup"]').encode(), FOLDER)
     assert not study.problems
@@ -143,7 +143,7 @@ def test_a_refused_name_comes_with_one_that_neither_the_study_nor_other_answers_
 
 
 @pytest.mark.parametrize("name", ["", "Water", "2nd", "with blank", "é", "a" * (MAX_ID + 1)])
-def test_check_id_refuses_what_is_no_id(name: str) -> None:
+def test_check_id_refuses_invalid_ids(name: str) -> None:
     with pytest.raises(StudyError, match="is not a valid ID: use at most"):
         check_id(name)
 
@@ -241,7 +241,7 @@ def test_a_point_is_duplicated_with_its_numbers() -> None:
 
 @pytest.fixture(scope="module")
 def translated() -> Study:
-    """The demo with two languages that are copies of the first one, as one step."""
+    """Return the demo with two more languages, copied from the first one in one step."""
     study = DEMO
     for code in ("nl", "de"):
         study, _ = study.with_edits(*edits_to_add_language(study, code))
@@ -251,10 +251,10 @@ def translated() -> Study:
 
 
 def words(study: Study) -> list[str]:
-    return [one for one in facts(study).warnings if "translated into" in one]
+    return [warning for warning in facts(study).warnings if "translated into" in warning]
 
 
-def test_copies_in_two_languages_are_counted_until_each_is_edited_and_a_missing_text_is_none(translated: Study) -> None:
+def test_copies_in_two_languages_are_counted_until_edited(translated: Study) -> None:
     count = sum(any(map(str.isalpha, str(text["en"]))) for _, text in localised_texts(translated))
     dutch = count - 1  # "baseline" is Dutch, too
     assert (translated.faults, copied_texts(translated)) == ((), {"nl": dutch, "de": count})
@@ -286,7 +286,7 @@ def with_question(text: str, short: str) -> Study:
 
 
 @pytest.mark.parametrize(
-    ("text", "short", "found"),
+    ("text", "short", "expected"),
     [
         ('"New question"', '"New question"', {("short",): "Was it cold"}),
         ('{ en = "Was", nl = "Was" }', '{ en = "Was", nl = "Kou" }', {("short", "en"): "Was it cold"}),
@@ -296,9 +296,9 @@ def with_question(text: str, short: str) -> Study:
         ('{ en = "Was" }', '"Was"', {}),
     ],
 )
-def test_a_short_text_that_says_what_the_text_says_follows_it(text: str, short: str, found: dict[Any, str]) -> None:
+def test_a_short_text_equal_to_the_text_follows_it(text: str, short: str, expected: dict[Any, str]) -> None:
     edits = short_text_edits(with_question(text, short), (*ITEM, "text"), "en", "Was it cold?")
-    assert {edit.path[len(ITEM) :]: edit.value for edit in edits} == found  # type: ignore[union-attr]
+    assert {edit.path[len(ITEM) :]: edit.value for edit in edits} == expected  # type: ignore[union-attr]
 
 
 def test_the_id_of_a_copy_with_a_long_number_is_as_long_as_permitted() -> None:
@@ -381,7 +381,7 @@ GONE = {"liquids.thick.density_kg_m3": None, "liquids.thick.effects": None}
         ),
     ],
 )  # fmt: skip
-def test_a_request_is_one_step_with_its_words_its_selection_and_no_other_change(
+def test_a_request_is_one_step_with_its_title_selection_and_changes_only(
     request_: steps.Request, words: str, select: Path | None, said: str, changes: dict[str, Any]
 ) -> None:
     study = study_of("demo")

@@ -1,4 +1,4 @@
-"""Every command of the designer at every kind of place: what it does to the document, undo, and its words."""
+"""Every command of the designer at every kind of element: its effect on the document, undo, and its texts."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
@@ -65,23 +65,23 @@ def elements(document: Mapping[str, Any]) -> Iterator[Path]:
             continue
         for path, _ in entries(document, f"{row.path[0]}.*"):
             yield path
-            lists = (one for one in rows(document, path) if one.kind == "list" and isinstance(one.value, tuple))
-            yield from ((*one.path, at) for one in lists for at in range(len(one.value)))
+            lists = (row for row in rows(document, path) if row.kind == "list" and isinstance(row.value, tuple))
+            yield from ((*row.path, at) for row in lists for at in range(len(row.value)))
 
 
 def of_row(row: Row, document: Mapping[str, Any]) -> Iterator[Request]:
-    """Yield what a row of a form can ask for."""
+    """Yield the requests that a row of a form can make."""
     path, value = row.path, row.value
     if value is not None:
         yield RemoveKey(path)
     elif row.kind != "kind":
         yield AddKey(path)
     if row.kind in OTHER and value is not None:
-        yield SetValue(path, next((one.value for one in row.choices if one.value != value), OTHER[row.kind]))
+        yield SetValue(path, next((choice.value for choice in row.choices if choice.value != value), OTHER[row.kind]))
     if row.kind == "kind":
-        yield from (SwitchKind(path[:-1], one.value) for one in row.choices if one.value != value)
+        yield from (SwitchKind(path[:-1], choice.value) for choice in row.choices if choice.value != value)
     if row.kind == "either":
-        yield from (SetValue(path, one.default) for one in row.either if one.default not in (None, value))
+        yield from (SetValue(path, option.default) for option in row.either if option.default not in (None, value))
     if row.kind in ("localised", "text", "paragraphs"):
         yield SetText(path, "nl", "Een andere tekst")
         yield SetText(path, "en", "Another text")
@@ -97,7 +97,7 @@ def of_row(row: Row, document: Mapping[str, Any]) -> Iterator[Request]:
 
 
 def of_element(study: Study, path: Path) -> Iterator[Request]:
-    """Yield what can be done with an element."""
+    """Yield the requests that concern an element."""
     document = study.document
     for row in rows(document, path):
         yield from of_row(row, document)
@@ -108,7 +108,7 @@ def of_element(study: Study, path: Path) -> Iterator[Request]:
     yield from (DeleteElement(path, how) for how in ("gaps", "all"))
     yield RenameElement(path, "renamed")
     yield from (MakeSeries(path, row.path, (3, 7, 20)) for row in number_rows(document, path)[:2])
-    others = [one for one, _ in entries(document, f"{path[0]}.*") if one[1] != path[1]]
+    others = [entry for entry, _ in entries(document, f"{path[0]}.*") if entry[1] != path[1]]
     if others and len(path) == 2:
         other = str(others[0][1])
         yield DeleteElement(path, "other", other)
@@ -120,15 +120,15 @@ def of_study(study: Study) -> Iterator[Request]:
 
 
 def generic(path: Path) -> Path:
-    """Return a path without its names: each kind of place is asked once."""
+    """Return a path without names, so that each kind of element is tested once."""
     return tuple(
         "*" if (at == 1 and len(path) > 1 and path[0] not in TABLES) or isinstance(step, int) else step
         for at, step in enumerate(path)
     )
 
 
-def asked(study: Study) -> Iterator[tuple[Path, Request, Any]]:
-    """Yield each request with the element that is selected, and the place that it is about.
+def every_request(study: Study) -> Iterator[tuple[Path, Request, Any]]:
+    """Yield each request with the selected element and the element that it concerns.
 
     All that can be added is added at the first kind of place that offers it, and at each kind of place one thing is.
     """
@@ -142,15 +142,15 @@ def asked(study: Study) -> Iterator[tuple[Path, Request, Any]]:
         if generic(path) in offered:
             continue
         offered.add(generic(path))
-        for one in addable_elements(study, path):
-            place = (*generic(path)[:1], one.label.partition(" of ")[0])
-            if isinstance(one.asks, AddElement | AddInstrument) and not added.issuperset(place):
+        for addition in addable_elements(study, path):
+            place = (*generic(path)[:1], addition.label.partition(" of ")[0])
+            if isinstance(addition.asks, AddElement | AddInstrument) and not added.issuperset(place):
                 added.update(place)
-                yield path, one.asks, place
+                yield path, addition.asks, place
 
 
 def edited(study: Study, *edits: Edit, text: str | None = None) -> Study:
-    """Return a study after a step, which is undone and done again, and which the text read anew is as well."""
+    """Return a study after a step; check that undo, redo and reading the text again agree with it."""
     document = Document(study)
     document.edit("Step", *edits, text=text)
     after = document.study
@@ -239,18 +239,18 @@ def outcome(study: Study, selected: Path, request: Request) -> Iterator[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SMALL)
-def test_each_command_does_what_it_says_and_undo_gives_the_text_back(name: str, pytestconfig: pytest.Config) -> None:
+def test_each_command_has_its_stated_effect_and_undo_restores_the_text(name: str, pytestconfig: pytest.Config) -> None:
     ((_, study),) = studies((name,))
-    seen = set[str]()
+    kinds = set[str]()
     words = list[str]()
-    for selected, request, place in asked(study):
+    for selected, request, place in every_request(study):
         kind = repr((type(request), place, getattr(request, "how", ""), getattr(request, "by", "")))
-        if kind not in seen:
-            seen.add(kind)
+        if kind not in kinds:
+            kinds.add(kind)
             try:
                 words += outcome(study, selected, request)
             except AssertionError as wrong:
                 raise AssertionError(f"{name} at {one_line(selected)}: {one_line(request)}: {wrong}") from wrong
-    assert len(seen) > 40
+    assert len(kinds) > 40
     if name == "sound":
         compare(GOLDEN / "commands.txt", each_once(words), pytestconfig)

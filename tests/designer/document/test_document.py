@@ -56,14 +56,14 @@ DEMO = read_study((PROTOCOLS / "demo.toml").read_bytes())
 
 
 @pytest.mark.parametrize("name", shipped())
-def test_a_study_is_what_check_reads(name: str) -> None:
+def test_a_study_equals_the_protocol_that_check_reads(name: str) -> None:
     study = read_study((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
     assert study.protocol == load(name)
     assert study.problems == ()
 
 
 @pytest.mark.parametrize(("old", "new"), [('liquid = "thin"', 'liquid = "thn"'), ("format = 2", "format = ")])
-def test_problems_are_those_of_check(old: str, new: str) -> None:
+def test_problems_equal_those_of_check(old: str, new: str) -> None:
     source = DEMO.text.replace(old, new).encode()
     with pytest.raises(ProtocolError) as raised:
         parse(source, "demo")
@@ -73,88 +73,96 @@ def test_problems_are_those_of_check(old: str, new: str) -> None:
 def test_steps_of_one_key_join_until_the_keyboard_rests(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 0.0
     monkeypatch.setattr("study_app.designer.document.document.time", SimpleNamespace(perf_counter=lambda: now_s))
-    opened = Document(DEMO)
+    document = Document(DEMO)
     for now_s, key in ((1.0, "title"), (1.5, "title"), (3.0, "title"), (3.1, "other"), (3.2, None), (3.3, None)):
-        opened.edit("Type", Set(("study", "title"), f"New at {now_s}"), key=key)
-    assert len(opened.done) == 5
+        document.edit("Type", Set(("study", "title"), f"New at {now_s}"), key=key)
+    assert len(document.done) == 5
     for _ in range(5):
-        opened.undo()
-    assert opened.study.text == DEMO.text
+        document.undo()
+    assert document.study.text == DEMO.text
 
 
 def test_a_step_of_several_edits_is_undone_and_redone_as_one() -> None:
-    opened = Document(DEMO, ("blocks", "liquids"))
+    document = Document(DEMO, ("blocks", "liquids"))
     edits = Set(("study", "title"), "New"), Set(("study", "version"), "9.9"), Insert(("sequence", 0), "liquids")
-    opened.edit("All three", *edits, select=("study",))
-    after = opened.study.text
-    assert [opened.study.document["study"][name] for name in ("title", "version")] == ["New", "9.9"]
-    opened.undo()
-    assert (opened.study.text, opened.selected) == (DEMO.text, ("blocks", "liquids"))
-    opened.redo()
-    assert (opened.study.text, opened.selected) == (after, ("study",))
+    document.edit("All three", *edits, select=("study",))
+    after = document.study.text
+    assert [document.study.document["study"][name] for name in ("title", "version")] == ["New", "9.9"]
+    document.undo()
+    assert (document.study.text, document.selected) == (DEMO.text, ("blocks", "liquids"))
+    document.redo()
+    assert (document.study.text, document.selected) == (after, ("study",))
 
 
-def title_of(opened: Document) -> Any:
-    return opened.study.document["study"]["title"]
+def title_of(document: Document) -> Any:
+    return document.study.document["study"]["title"]
 
 
-def edit_title(opened: Document, title: str, **given: Any) -> None:
-    opened.edit(title, Set(("study", "title"), title), **given)
+def edit_title(document: Document, title: str, **options: Any) -> None:
+    document.edit(title, Set(("study", "title"), title), **options)
 
 
-def test_undo_and_redo_lose_no_step_and_an_edit_ends_what_can_be_redone() -> None:
-    opened = Document(DEMO, ("tasks",))
+def test_undo_and_redo_keep_every_step_and_an_edit_clears_redo() -> None:
+    document = Document(DEMO, ("tasks",))
     for title, selected in (("One", ("study",)), ("Two", ("scene",)), ("Three", None)):
-        edit_title(opened, title, select=selected, key="title")
-        opened.end_step()
-    assert [(step.title, step.before, step.after) for step in opened.done] == [
+        edit_title(document, title, select=selected, key="title")
+        document.end_step()
+    assert [(step.title, step.before, step.after) for step in document.done] == [
         ("One", ("tasks",), ("study",)), ("Two", ("study",), ("scene",)), ("Three", ("scene",), ("scene",))
     ]  # fmt: skip
-    seen = []
-    for act in (opened.undo, opened.undo, opened.redo, opened.undo, opened.undo, opened.undo, opened.redo):
+    states = []
+    for act in (
+        document.undo,
+        document.undo,
+        document.redo,
+        document.undo,
+        document.undo,
+        document.undo,
+        document.redo,
+    ):
         act()
-        seen.append((title_of(opened), opened.selected, len(opened.done), len(opened.undone)))
+        states.append((title_of(document), document.selected, len(document.done), len(document.undone)))
     first = DEMO.document["study"]["title"]
-    assert seen == [
+    assert states == [
         ("Two", ("scene",), 2, 1), ("One", ("study",), 1, 2), ("Two", ("scene",), 2, 1), ("One", ("study",), 1, 2),
         (first, ("tasks",), 0, 3), (first, ("tasks",), 0, 3), ("One", ("study",), 1, 2),
     ]  # fmt: skip
-    edit_title(opened, "Four", key="title")
-    assert (len(opened.done), opened.undone) == (2, [])
-    opened.redo()
-    assert title_of(opened) == "Four"
-    edit_title(opened, "Five", select=("limits",), key="title")
-    assert [(step.title, step.before, step.after) for step in opened.done[1:]] == [("Five", ("study",), ("limits",))]
-    opened.undo()
-    edit_title(opened, "Six", key="title")
-    assert [step.title for step in opened.done] == ["One", "Six"], "an undone step is closed"
-    opened.undo()
-    assert (title_of(opened), opened.selected) == ("One", ("study",))
+    edit_title(document, "Four", key="title")
+    assert (len(document.done), document.undone) == (2, [])
+    document.redo()
+    assert title_of(document) == "Four"
+    edit_title(document, "Five", select=("limits",), key="title")
+    assert [(step.title, step.before, step.after) for step in document.done[1:]] == [("Five", ("study",), ("limits",))]
+    document.undo()
+    edit_title(document, "Six", key="title")
+    assert [step.title for step in document.done] == ["One", "Six"], "an undone step is closed"
+    document.undo()
+    assert (title_of(document), document.selected) == ("One", ("study",))
 
 
 def test_the_last_500_steps_can_be_undone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(document, "_MAX_STEPS", 3)
-    opened = Document(DEMO)
+    edited_document = Document(DEMO)
     for number in range(5):
-        edit_title(opened, f"Title {number}")
+        edit_title(edited_document, f"Title {number}")
     for _ in range(5):
-        opened.undo()
-    assert (title_of(opened), len(opened.undone)) == ("Title 1", 3)
+        edited_document.undo()
+    assert (title_of(edited_document), len(edited_document.undone)) == ("Title 1", 3)
 
 
 def test_a_text_and_edits_of_it_are_one_step() -> None:
-    opened = Document(DEMO)
-    opened.edit("Both", Set(("study", "version"), "7"), text=DEMO.text.replace('"A first look"', '"Typed"', 1))
-    assert (title_of(opened), opened.version, opened.title, opened.name) == ("Typed", "7", "Typed", "demo")
-    opened.undo()
-    assert opened.study.text == DEMO.text
-    opened.edit("Text", text=re.sub(r"(?m)^version = .*\n", "", DEMO.text, count=1))
-    assert (opened.version, len(opened.done)) == ("1", 1)
+    document = Document(DEMO)
+    document.edit("Both", Set(("study", "version"), "7"), text=DEMO.text.replace('"A first look"', '"Typed"', 1))
+    assert (title_of(document), document.version, document.title, document.name) == ("Typed", "7", "Typed", "demo")
+    document.undo()
+    assert document.study.text == DEMO.text
+    document.edit("Text", text=re.sub(r"(?m)^version = .*\n", "", DEMO.text, count=1))
+    assert (document.version, len(document.done)) == ("1", 1)
 
 
 @pytest.fixture
 def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A study of the workspace."""
+    """Return a study of the workspace."""
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     file = tmp_path / "protocols" / "own.toml"
     file.parent.mkdir()
@@ -163,18 +171,23 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_draft_is_kept_while_the_text_differs_from_the_file_and_comes_back(own: Path, tmp_path: Path) -> None:
-    opened = open_file(own, tmp_path / "results")
-    assert (opened.edited, opened.draft, opened.kept, opened.selected) == (False, None, None, ("pages", "welcome"))
-    edit_title(opened, "Draft", select=("tasks", "reach"))
-    opened.note_edit(5.0)
-    assert (opened.edited, opened.write_draft(5.0 + REST_S - 0.01), opened.kept) == (True, False, None)
-    assert opened.write_draft(5.0 + REST_S)
-    assert opened.kept is not None
+    document = open_file(own, tmp_path / "results")
+    assert (document.edited, document.draft, document.kept, document.selected) == (
+        False,
+        None,
+        None,
+        ("pages", "welcome"),
+    )
+    edit_title(document, "Draft", select=("tasks", "reach"))
+    document.note_edit(5.0)
+    assert (document.edited, document.write_draft(5.0 + REST_S - 0.01), document.kept) == (True, False, None)
+    assert document.write_draft(5.0 + REST_S)
+    assert document.kept is not None
     again = open_file(own, tmp_path / "results")
     assert (title_of(again), again.selected, [step.title for step in again.done]) == (
         "Draft", ("tasks", "reach"), ["Restore the draft"]
     )  # fmt: skip
-    assert (again.draft.text, again.base) == (opened.study.text, opened.base)  # type: ignore[union-attr]
+    assert (again.draft.text, again.base) == (document.study.text, document.base)  # type: ignore[union-attr]
     again.undo()
     assert again.study.text == own.read_text("utf-8")
     again.note_edit(0.0)
@@ -188,36 +201,41 @@ def test_a_draft_is_kept_while_the_text_differs_from_the_file_and_comes_back(own
     assert title_of(again) == "Draft"
 
 
-def test_what_another_program_writes_is_taken_or_kept_out(own: Path, tmp_path: Path) -> None:
-    opened, other = open_file(own, tmp_path / "results"), TEXT.replace('"A first look"', '"Other"', 1)
-    edit_title(opened, "Mine")
-    assert not opened.changed_outside()
+def test_changes_of_another_program_are_accepted_or_rejected(own: Path, tmp_path: Path) -> None:
+    document, other = open_file(own, tmp_path / "results"), TEXT.replace('"A first look"', '"Other"', 1)
+    edit_title(document, "Mine")
+    assert not document.changed_outside()
     own.write_text(other, encoding="utf-8", newline="\n")
-    assert opened.changed_outside()
-    opened.keep_edits(0.0)
-    assert (title_of(opened), opened.saved, opened.changed_outside(), opened.edited) == ("Mine", other, False, True)
-    opened.take_file_content()
-    assert (title_of(opened), opened.edited, opened.done[-1].title) == ("Other", False, "Use the file's content")
-    assert opened.base == opened.keeper.base == content_hash(other.encode())
-    opened.undo()
-    assert title_of(opened) == "Mine"
+    assert document.changed_outside()
+    document.keep_edits(0.0)
+    assert (title_of(document), document.saved, document.changed_outside(), document.edited) == (
+        "Mine",
+        other,
+        False,
+        True,
+    )
+    document.take_file_content()
+    assert (title_of(document), document.edited, document.done[-1].title) == ("Other", False, "Use the file's content")
+    assert document.base == document.keeper.base == content_hash(other.encode())
+    document.undo()
+    assert title_of(document) == "Mine"
     own.unlink()
-    assert opened.changed_outside()
-    opened.keep_edits(0.0)
-    assert (opened.base, opened.saved, opened.changed_outside()) == ("", "", False)
-    opened.save(())
-    assert own.read_text("utf-8") == opened.study.text
-    assert (opened.edited, opened.changed_outside(), draft_of(own)) == (False, False, None)
+    assert document.changed_outside()
+    document.keep_edits(0.0)
+    assert (document.base, document.saved, document.changed_outside()) == ("", "", False)
+    document.save(())
+    assert own.read_text("utf-8") == document.study.text
+    assert (document.edited, document.changed_outside(), draft_of(own)) == (False, False, None)
     own.unlink()
     assert Document(DEMO, (), own).changed_outside() is False, "it was never saved"
 
 
-def test_a_study_that_cannot_be_changed_says_why(own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_read_only_study_states_the_reason(own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     results = tmp_path / "results"
     assert open_file(shipped()["demo"], results).read_only.startswith("This study ships with the program.")
-    edit_title(opened := open_file(own, results), "Draft")
-    opened.note_edit(0.0)
-    opened.write_draft()
+    edit_title(edited_document := open_file(own, results), "Draft")
+    edited_document.note_edit(0.0)
+    edited_document.write_draft()
     path = results / "own" / "data" / "sub-P001" / "ses-01"
     path.mkdir(parents=True)
     monkeypatch.setattr(document, "is_open", lambda folder: folder == path)
@@ -230,15 +248,15 @@ def test_a_study_that_cannot_be_changed_says_why(own: Path, tmp_path: Path, monk
 
 
 def test_a_copy_takes_the_edits_along_and_leaves_the_original_as_saved(own: Path, tmp_path: Path) -> None:
-    opened = open_file(own, tmp_path / "results")
-    edit_title(opened, "Mine", select=("scene",))
-    copy = opened.copy_as("other")
+    document = open_file(own, tmp_path / "results")
+    edit_title(document, "Mine", select=("scene",))
+    copy = document.copy_as("other")
     assert (copy.name, copy.version, title_of(copy), copy.selected) == ("other", "0.1", "Mine", ("scene",))
     assert (copy.file, copy.base, [step.title for step in copy.done]) == (
         own.with_name("other.toml"), "", ["Mine", "Save as other"]
     )  # fmt: skip
     assert draft_of(copy.file).text == copy.study.text  # type: ignore[union-attr]
-    assert (opened.edited, title_of(opened)) == (False, "A first look")
+    assert (document.edited, title_of(document)) == (False, "A first look")
     unsaved = open_unsaved(copy.file, draft_of(copy.file))  # type: ignore[arg-type]
     assert (unsaved.study.text, unsaved.file, unsaved.base, unsaved.edited) == (copy.study.text, copy.file, "", True)
     assert (unsaved.selected, open_unsaved(copy.file, Draft(text="", base="")).selected) == (("scene",), ("study",))
@@ -251,27 +269,27 @@ def test_a_copy_takes_the_edits_along_and_leaves_the_original_as_saved(own: Path
 
 
 def test_a_version_that_was_run_is_not_saved_with_other_content(own: Path, tmp_path: Path) -> None:
-    opened = open_file(own, tmp_path / "results")
-    ran = (Run(hash=content_hash(opened.study.source), version="1.0", sessions=2),)
-    opened.save(ran)
-    edit_title(opened, "Mine")
-    with pytest.raises(Refused, match=r"version 1\.0 has .* content \(2 sessions\): save the study as version 1\.1"):
-        opened.save(ran)
-    standing = opened.standing(ran)
-    assert (standing.version, standing.conflicts, standing.needs_confirmation) == ("1.1", 2, True)
-    assert opened.standing(()).needs_confirmation is False
-    opened.edit("Version", Set(("study", "version"), "1.1"))
-    opened.save(ran)
-    assert kept_content(content_hash(opened.study.source)) == opened.study.source == own.read_bytes()
+    document = open_file(own, tmp_path / "results")
+    ran = (Run(hash=content_hash(document.study.source), version="1.1", sessions=2),)
+    document.save(ran)
+    edit_title(document, "Mine")
+    with pytest.raises(Refused, match=r"version 1\.1 has .* content \(2 sessions\): save the study as version 1\.2"):
+        document.save(ran)
+    standing = document.standing(ran)
+    assert (standing.version, standing.conflicts, standing.needs_confirmation) == ("1.2", 2, True)
+    assert document.standing(()).needs_confirmation is False
+    document.edit("Version", Set(("study", "version"), "1.2"))
+    document.save(ran)
+    assert kept_content(content_hash(document.study.source)) == document.study.source == own.read_bytes()
 
 
-def test_a_step_that_changes_nothing_is_none() -> None:
+def test_an_edit_without_a_change_is_not_a_step() -> None:
     same = Document(DEMO, ())
     same.edit("Same", Set(("format",), 2), select=("study",))
     assert (same.done, same.selected) == ([], ("study",))
 
 
-def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> None:
+def test_a_study_with_a_liquid_file_shows_only_its_own_text(tmp_path: Path) -> None:
     (tmp_path / "thick.toml").write_text(
         "format = 2\n[liquids.any]\ndensity_kg_m3 = 1400\n", encoding="utf-8", newline="\n"
     )
@@ -317,25 +335,25 @@ def test_keeper_writes_within_its_rest_however_fast_edits_follow(tmp_path: Path)
     assert keeper.write()
     assert not keeper.write()
     assert not keeper.write_if_due(99)
-    found = draft_of(tmp_path / "a.toml")
-    assert found is not None
-    assert found.text == "x" * 299
+    draft = draft_of(tmp_path / "a.toml")
+    assert draft is not None
+    assert draft.text == "x" * 299
     keeper.note_saved("hash")
     assert draft_of(tmp_path / "a.toml") is None
 
 
 def test_the_draft_of_another_program_is_kept_as_a_version_and_not_discarded(tmp_path: Path) -> None:
     file = tmp_path / "a.toml"
-    one, other = Keeper(file, ""), Keeper(file, "")
-    for keeper, text in ((one, "mine"), (other, "yours"), (one, "mine again")):
+    first, second = Keeper(file, ""), Keeper(file, "")
+    for keeper, text in ((first, "mine"), (second, "yours"), (first, "mine again")):
         keeper.note_edit(text, (), 0.0)
         keeper.write()
     assert [kept_content(kept.hash) for kept in kept_versions(file)] == [b"mine", b"yours"]
     assert {kept.origin for kept in kept_versions(file)} == {"draft"}
-    assert (one.others, other.others) == (1, 1)
-    other.note_saved("hash")
+    assert (first.others, second.others) == (1, 1)
+    second.note_saved("hash")
     assert draft_of(file) is not None
-    one.note_saved("hash")
+    first.note_saved("hash")
     assert draft_of(file) is None
 
 
@@ -369,7 +387,7 @@ def test_a_draft_that_could_not_be_deleted_is_deleted_as_soon_as_that_is_possibl
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"text": 1, "base": "", "selected": [], "kept_at": ""}'])
-def test_a_broken_draft_is_none(tmp_path: Path, content: bytes) -> None:
+def test_a_broken_draft_is_ignored(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "a.toml"
     write_draft(file, Draft(text="x", base=""))
     (path,) = Path(os.environ["LIQUID_STUDY_DATA"], "drafts").glob("*.json")
@@ -392,21 +410,21 @@ def session(folder: Path, participant: str, source: bytes, **facts: Any) -> None
 
 
 def test_runs_counts_sessions_pilots_and_rehearsals_by_content(tmp_path: Path) -> None:
-    one, other = TEXT.encode(), TEXT.replace('version = "1.0"', 'version = "1.1"').encode()
-    session(tmp_path / "demo", "P001", one)
-    session(tmp_path / "demo", "P002", one)
-    session(tmp_path / "demo", "P003", other, started_at="2026-11-22T12:00:00+00:00")
-    session(tmp_path / "demo-pilot", "P001", one, pilot=True)
-    session(tmp_path / "demo-pilot-2", "P001", other, pilot=True, simulated=True)  # played and kept
-    session(tmp_path / "demo-rehearsal-1", "P001", other, simulated=True)
+    source, other_source = TEXT.encode(), TEXT.replace('version = "1.1"', 'version = "1.2"').encode()
+    session(tmp_path / "demo", "P001", source)
+    session(tmp_path / "demo", "P002", source)
+    session(tmp_path / "demo", "P003", other_source, started_at="2026-11-22T12:00:00+00:00")
+    session(tmp_path / "demo-pilot", "P001", source, pilot=True)
+    session(tmp_path / "demo-pilot-2", "P001", other_source, pilot=True, simulated=True)  # played and kept
+    session(tmp_path / "demo-rehearsal-1", "P001", other_source, simulated=True)
     (tmp_path / "demo" / "data" / "sub-P004" / "ses-01").mkdir(parents=True)
-    found = runs_of_study(tmp_path, "demo")
-    assert [(run.version, run.sessions, run.pilots, run.rehearsals) for run in found] == [
-        ("1.0", 2, 1, 0),
-        ("1.1", 1, 1, 1),
+    runs = runs_of_study(tmp_path, "demo")
+    assert [(run.version, run.sessions, run.pilots, run.rehearsals) for run in runs] == [
+        ("1.1", 2, 1, 0),
+        ("1.2", 1, 1, 1),
     ]
-    assert [run.hash for run in found] == [protocol_hash(one), protocol_hash(other)]
-    assert found[0].protocol == json.loads(json.dumps(without_conditions(parse(one, "demo"))))
+    assert [run.hash for run in runs] == [protocol_hash(source), protocol_hash(other_source)]
+    assert runs[0].protocol == json.loads(json.dumps(without_conditions(parse(source, "demo"))))
     assert runs_of_study(tmp_path, "other") == ()
 
 
@@ -419,7 +437,7 @@ def test_a_content_that_was_run_is_kept_before_the_file_changes(tmp_path: Path) 
     assert kept_content(content_hash(TEXT.encode())) == TEXT.encode()
 
 
-def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
+def test_standing_states_whether_saving_asks_and_the_free_version() -> None:
     ran = (
         Run(hash="abc", version="1.0", sessions=2),
         Run(hash="def", version="1.1", sessions=1),
@@ -443,7 +461,7 @@ def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
 
 
 @pytest.mark.parametrize("version", ["", "1 2", "1,2", "é"])
-def test_what_cannot_be_a_version_is_refused(version: str) -> None:
+def test_invalid_and_reused_versions_are_rejected(version: str) -> None:
     check_version("1.2-rc+3", [Run(hash="abc", version="1.2-rc+3", pilots=1)])
     with pytest.raises(StudyError, match="is not a valid version"):
         check_version(version, [])
@@ -556,9 +574,9 @@ def test_a_study_of_another_folder_is_saved_with_its_liquid_files_and_videos(tmp
         path.unlink()
     assert not (target / "refused.toml").exists()
     for name in ("first", "second"):  # the second one finds the same files there
-        opened = Document(study, (), target / f"{name}.toml")
-        opened.save(())
+        document = Document(study, (), target / f"{name}.toml")
+        document.save(())
         assert (target / f"{name}.toml").read_text(encoding="utf-8") == text
         assert (syrup.read_text(encoding="utf-8"), film.read_bytes()) == (SYRUP, FILM)
-        assert opened.study.folder == target.resolve()
+        assert document.study.folder == target.resolve()
     assert {path.name for path in source.iterdir()} == {"films", "syrup.toml"}, "the other folder is only read"

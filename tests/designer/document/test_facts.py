@@ -43,7 +43,7 @@ def test_each_repair_of_the_known_faults_removes_its_fault() -> None:
     assert len(repaired) >= 30, sorted(repaired)
 
 
-def test_what_does_not_belong_there_is_removed_by_a_repair_and_not_by_its_reader() -> None:
+def test_surplus_keys_are_removed_by_a_repair() -> None:
     studies = [(case, read_study(case.text.encode())) for file in FILES for case in cases_of(file)]
     surplus = [(study, fault, case) for case, study in studies for fault in study.faults if fault.kind == "surplus"]
     assert len({fault.message for _, fault, _ in surplus}) > 15
@@ -61,7 +61,9 @@ def _repaired(case: Case) -> int:
     for fault in study.faults:
         for repair in repairs(study, fault):
             after, _ = study.with_edits(*repair.edits)
-            assert (fault.path, fault.message) not in {(one.path, one.message) for one in after.faults}
+            assert (fault.path, fault.message) not in {
+                (remaining.path, remaining.message) for remaining in after.faults
+            }
             count += 1
     return count
 
@@ -71,9 +73,7 @@ def _repaired(case: Case) -> int:
     ("standard", "frequency_hz", "limit", "most"),
     [(40, 1.0, "the slope limit", 0.324), (30, 1.3, "device.force_limit_n", 0.36)],
 )
-def test_the_highest_level_is_that_of_fixed_levels_too(
-    standard: float, frequency_hz: float, limit: str, most: float
-) -> None:
+def test_the_highest_level_includes_fixed_levels(standard: float, frequency_hz: float, limit: str, most: float) -> None:
     edits = Set(("stimuli", "damping", "standards"), [standard]), Set(("tasks", "stir", "frequency_hz"), frequency_hz)
     study, _ = template("viscosity-jnd").with_edits(*edits)
     (fault,) = study.faults  # one for both blocks
@@ -100,32 +100,32 @@ def test_a_fault_of_a_question_counts_once_at_its_block() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
-def test_facts_are_those_of_the_session_and_of_check(name: str) -> None:
+def test_facts_agree_with_the_session_and_with_check(name: str) -> None:
     study = study_of(name)
     assert study.protocol is not None
-    found = facts(study)
+    study_facts = facts(study)
     steps = build_schedule(study.protocol, "P001", 1).steps
-    assert found.trials == sum(isinstance(step, Trial) for step in steps)
-    assert found.answers == sum(
+    assert study_facts.trials == sum(isinstance(step, Trial) for step in steps)
+    assert study_facts.answers == sum(
         len(step.items)
         for step in steps
         if isinstance(step, FormStep) or (isinstance(step, Trial) and step.phase == "main")
     )
-    assert found.expected_s == pytest.approx(sum(found.steps_s.values()))
+    assert study_facts.expected_s == pytest.approx(sum(study_facts.steps_s.values()))
     words = describe(study.protocol)
-    assert f"about {found.expected_s / 60:.0f} min" in words
-    assert all(warning in words for warning in found.warnings)
-    assert set(found.forces_n) == set(study.protocol.liquids)
-    assert found.missing == {}
+    assert f"about {study_facts.expected_s / 60:.0f} min" in words
+    assert all(warning in words for warning in study_facts.warnings)
+    assert set(study_facts.forces_n) == set(study.protocol.liquids)
+    assert study_facts.missing == {}
 
 
-def test_levels_say_which_limit_clips_them() -> None:
+def test_levels_state_the_limit_that_clips_them() -> None:
     protocol = load("viscosityjnd")
     slow = protocol.device.model_copy(update={"rate_hz": 500.0})
     weak = protocol.device.model_copy(update={"force_limit_n": 2.0})
     by = {
-        device: {level.clipped_by for level in levels(protocol.model_copy(update={"device": one}), "viscosity")}
-        for device, one in (("slow", slow), ("weak", weak))
+        device: {level.clipped_by for level in levels(protocol.model_copy(update={"device": settings}), "viscosity")}
+        for device, settings in (("slow", slow), ("weak", weak))
     }
     assert "slope" in by["slow"]
     assert "norm" in by["weak"]
@@ -156,7 +156,7 @@ def test_a_study_with_clipped_levels_still_has_its_numbers() -> None:
     assert clipped.protocol is None
     assert clipped.formed is not None
     assert facts(clipped).trials
-    assert any(one.clipped_by for one in levels(clipped.formed, "viscosity"))
+    assert any(level.clipped_by for level in levels(clipped.formed, "viscosity"))
     broken, _ = clipped.with_edits(Set(("study", "version"), 3))
     assert broken.formed is None
 
@@ -232,14 +232,14 @@ def test_texts_that_the_program_lacks_in_a_language_are_missing_and_each_is_a_pr
 
 
 @pytest.mark.parametrize(("text", "word"), [("Now comes Light Oil", "light oil"), ("Seen 50 ms late", "50 ms")])
-def test_a_text_that_names_what_is_compared_is_found(text: str, word: str) -> None:
+def test_a_text_that_reveals_the_comparison_is_found(text: str, word: str) -> None:
     study = study_of("rek2024")
     assert study.protocol is not None
     assert revealing_texts(study, study.protocol) == ()
     changed, _ = study.with_edits(Set(("blocks", "liquids", "setting_label", "en"), text))
     assert changed.protocol is not None
-    (found,) = revealing_texts(changed, changed.protocol)
-    assert (found.path, found.word) == (("blocks", "liquids", "setting_label"), word)
+    (revealing,) = revealing_texts(changed, changed.protocol)
+    assert (revealing.path, revealing.word) == (("blocks", "liquids", "setting_label"), word)
 
 
 def test_an_order_is_even_at_full_rounds_of_its_square() -> None:
@@ -316,7 +316,7 @@ def plan_of(trials: int = 40, *changes: Set) -> ThresholdPlan:
 
 
 @pytest.mark.parametrize(
-    ("changes", "asked", "presented"),
+    ("changes", "levels_requested", "presented"),
     [
         (CLIPPED, [0.02, 0.6, 0.7, 2.0], [0.02, 0.6, FULL, FULL]),
         ((*CLIPPED[:1], Set(("stimuli", "damping", "levels"), [0.02, 0.6])), [0.6], [0.6]),
@@ -329,11 +329,11 @@ def plan_of(trials: int = 40, *changes: Set) -> ThresholdPlan:
     ],
 )
 def test_levels_are_presented_as_the_limits_leave_them(
-    changes: tuple[Set, ...], asked: list[float], presented: list[float]
+    changes: tuple[Set, ...], levels_requested: list[float], presented: list[float]
 ) -> None:
     plan = plan_of(40, *changes)
-    found = 10.0 ** plan.presented(np.log10(asked))
-    assert found.tolist() == pytest.approx(presented, rel=1e-6)
+    levels_shown = 10.0 ** plan.presented(np.log10(levels_requested))
+    assert levels_shown.tolist() == pytest.approx(presented, rel=1e-6)
 
 
 def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
@@ -372,9 +372,9 @@ def test_a_threshold_whose_levels_are_clipped_has_no_precision(standard: float) 
     assert known is not None
     assert not known.measured
     assert (known.participants_for(0.15), known.trials_for(0.15, 12)) == (None, None)
-    found = threshold_studies.study_batch(threshold_studies.Case("viscosity", plan, (1,)), (12,))
-    assert found.within(0, 100.0) == 0.0
-    assert math.isinf(found.spread)
+    estimates = threshold_studies.study_batch(threshold_studies.Case("viscosity", plan, (1,)), (12,))
+    assert estimates.within(0, 100.0) == 0.0
+    assert math.isinf(estimates.spread)
     full = threshold_studies.study_batch(threshold_studies.Case("viscosity", replace(plan, clipping=None), (1,)), (12,))
     assert full.within(0, 100.0) == 1.0
 
@@ -382,8 +382,8 @@ def test_a_threshold_whose_levels_are_clipped_has_no_precision(standard: float) 
 @pytest.mark.slow
 def test_each_standard_is_simulated_as_limits_clip_it() -> None:
     plan = plan_of(24, Set(("stimuli", "damping", "standards"), [8, 32]), CLIPPED[1])
-    asked = np.log10([0.02, 0.6, 2.0])
-    high, low = (10.0 ** one.presented(asked) for one in plan.each_standard())
+    levels_requested = np.log10([0.02, 0.6, 2.0])
+    high, low = (10.0 ** standard_plan.presented(levels_requested) for standard_plan in plan.each_standard())
     assert high.tolist() == pytest.approx([0.02, 0.6, FULL], rel=1e-6)
     assert low.tolist() == pytest.approx([0.02, 0.6, 2.0])
     assert plan.clipping is not None
@@ -393,8 +393,8 @@ def test_each_standard_is_simulated_as_limits_clip_it() -> None:
     assert same is not None
     assert own.spread < 0.95 * same.spread
     studies = (
-        threshold_studies.study_batch(threshold_studies.Case("viscosity", one, (1,)), (20,))
-        for one in (plan, all_as_the_highest)
+        threshold_studies.study_batch(threshold_studies.Case("viscosity", case_plan, (1,)), (20,))
+        for case_plan in (plan, all_as_the_highest)
     )
-    own_errors, same_errors = (np.concatenate(one.errors) for one in studies)
+    own_errors, same_errors = (np.concatenate(batch.errors) for batch in studies)
     assert own_errors[:, 1].std() < 0.9 * same_errors[:, 1].std()

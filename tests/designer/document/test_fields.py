@@ -37,31 +37,31 @@ def with_value(document: Any, path: Path, value: Any) -> Any:
 
 
 def every_row(document: Any, path: Path = ()) -> Iterator[Row]:
-    """Yield the rows of a form and of all within it: of each kind, of an entry, of a table of any name."""
+    """Yield the rows of a form and of its nested forms: of each kind, of an entry, of a table with any name."""
     for row in rows(document, path):
         yield row
         if row.kind == "kind" and row.value is None:
             for choice in row.choices:
                 if choice.value is not None:
                     yield from every_row(with_value(document, row.path, choice.value), path)
-        for one in (row, *row.either):
-            if one.kind == "table":
+        for alternative in (row, *row.either):
+            if alternative.kind == "table":
                 yield from every_row(document, row.path)
-            elif one.kind == "tables":
+            elif alternative.kind == "tables":
                 yield from every_row(with_value(document, (*row.path, "any"), {}), (*row.path, "any"))
-            elif one.kind in {"list", "points"}:
+            elif alternative.kind in {"list", "points"}:
                 yield from every_row(with_value(document, (*row.path, 0), {}), (*row.path, 0))
 
 
-def described(node: Any) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+def described_keys(node: Any) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """Yield key, description and bounds of everything in the schema that has a description."""
     for definition in (node, *node["$defs"].values()):
         for key, part in definition.get("properties", {}).items():
             bounds = [
-                one[name]
-                for one in (part, *part.get("anyOf", ()))
+                variant[name]
+                for variant in (part, *part.get("anyOf", ()))
                 for name in ("minimum", "maximum")
-                if abs(one.get(name, math.inf)) < 1e6
+                if abs(variant.get(name, math.inf)) < 1e6
             ]
             if "description" in part:
                 yield key, part["description"], tuple(map(exact_text, bounds))
@@ -86,17 +86,17 @@ def test_a_choice_has_the_label_of_its_value_with_its_package_and_whether_it_is_
 
 
 def test_every_key_of_every_model_reaches_a_form_with_its_words_and_bounds() -> None:
-    found: dict[tuple[str | int, str], str] = {}
+    bounds_of_rows: dict[tuple[str | int, str], str] = {}
     for row in every_row({}):
-        bounds = [*row.bounds, *(text for one in row.either for text in one.bounds)]
-        found[row.path[-1], row.help] = " ".join(bounds)
+        bounds = [*row.bounds, *(text for alternative in row.either for text in alternative.bounds)]
+        bounds_of_rows[row.path[-1], row.help] = " ".join(bounds)
         assert row.label
         texts = [row.help, *(choice.sentence for choice in row.choices)]
         assert not [text for text in texts if "\n" in text or "`" in text], row.path
-    for key, description, bounds in described(schema()):
+    for key, description, bounds in described_keys(schema()):
         words = re.sub("`(.+?)`", "“\\1”", " ".join(description.replace("``", "").split()))
-        assert (key, words) in found
-        assert all(bound in found[key, words] for bound in bounds), key
+        assert (key, words) in bounds_of_rows
+        assert all(bound in bounds_of_rows[key, words] for bound in bounds), key
 
 
 def test_every_unit_of_the_models_is_known() -> None:
@@ -121,7 +121,7 @@ def patterns_in(node: Any) -> Iterator[str]:
         yield from patterns_in(part)
 
 
-def test_every_pattern_of_the_models_is_told_in_words() -> None:
+def test_every_pattern_of_the_models_has_a_description() -> None:
     patterns = {*patterns_in(schema()), *patterns_in(MachineSettings.model_json_schema())}
     assert len(patterns) >= 11
     assert [pattern for pattern in patterns if rule_of(pattern) == rule_of("^$") or "^" in rule_of(pattern)] == []
@@ -138,7 +138,7 @@ def test_every_value_that_can_be_chosen_has_its_sentence() -> None:
     assert lacking == set()
 
 
-def test_an_added_table_has_what_it_needs_and_no_required_choice_is_called_a_default() -> None:
+def test_an_added_table_is_complete_and_its_required_choice_has_no_default() -> None:
     study = read_study(text_of("sound").encode(), PROTOCOLS)
     item = next(path for path, item in entries(study.document, "questionnaires.*.items.*") if "show_if" not in item)
     liquid = ("liquids", next(iter(study.document["liquids"])))
@@ -166,15 +166,15 @@ def shown_at(study: Study, fault: Fault) -> str:
 
     A missing text is shown by its empty field.
     """
-    found = form_of(study, element_of(study, fault.path))
+    form = form_of(study, element_of(study, fault.path))
     if fault.kind == "no text":
-        return "row" if any(fault.path[: len(row.path)] == row.path for row in found.rows) else ""
+        return "row" if any(fault.path[: len(row.path)] == row.path for row in form.rows) else ""
     sentence = f"{fault.message[:1].upper()}{fault.message[1:]}"
     places = (
-        ("row", [words for row in found.rows if fault.path[: len(row.path)] == row.path for words in row.faults]),
-        ("section", [words for section in found.sections for words in section.faults]),
-        ("id", list(found.id_faults)),
-        ("element", list(found.faults)),
+        ("row", [words for row in form.rows if fault.path[: len(row.path)] == row.path for words in row.faults]),
+        ("section", [words for section in form.sections for words in section.faults]),
+        ("id", list(form.id_faults)),
+        ("element", list(form.faults)),
     )
     return next((place for place, said in places if any(words.startswith(sentence) for words in said)), "")
 

@@ -58,7 +58,7 @@ def test_an_element_is_referred_to_by_each_text_that_names_it() -> None:
     assert references_to(DOCUMENT, ("liquids", "honey")) == ()
 
 
-def test_the_permitted_names_are_those_of_the_elements() -> None:
+def test_the_permitted_names_equal_those_of_the_elements() -> None:
     assert choices_at(DOCUMENT, ("conditions", "lost", "liquid")) == ("water", "oil")
     assert choices_at(DOCUMENT, ("blocks", "first", "standard")) == ("thin", "thick")
     assert choices_at(DOCUMENT, ("questionnaires", "end", "scores", "other", "items", 0)) == ("age", "easy")

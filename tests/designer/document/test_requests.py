@@ -1,4 +1,4 @@
-"""Each request of the designer: its words, what it selects and announces, and the lines of the file that it changes.
+"""Each request of the designer: title, selection, announcement, and the changed lines of the file.
 
 ``requests.txt`` has a part for each; its first line is the request. It is changed by hand: no option regenerates it.
 """
@@ -29,8 +29,8 @@ PLAIN = Step("", ())
 MOST, WIDE = 12, 64
 
 
-def told(line: str) -> list[str]:
-    """Return the words of a request, its other facts, and the lines that it removes and adds."""
+def request_lines(line: str) -> list[str]:
+    """Return the title of a request, its other fields, and the lines that it removes and adds."""
     name, _, call = line.partition(": ")
     study = STUDIES[name]
     try:
@@ -53,7 +53,7 @@ def told(line: str) -> list[str]:
     ("line", "expected"), [(line, rest) for line, *rest in PARTS], ids=[part[0][:60] for part in PARTS]
 )
 def test_a_request_changes_these_lines(line: str, expected: list[str]) -> None:
-    assert told(line) == expected
+    assert request_lines(line) == expected
 
 
 def test_every_request_is_in_the_table() -> None:

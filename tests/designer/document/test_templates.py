@@ -1,4 +1,4 @@
-"""Templates: each is a study that works, and ``liquid-study new`` makes a study of one's own of it."""
+"""Templates: each is a working study, and ``liquid-study new`` makes a new study from it."""
 
 import math
 import re
@@ -66,9 +66,9 @@ def test_no_page_of_a_template_names_a_liquid_or_a_number_that_is_easily_replace
 
 @pytest.mark.parametrize("name", templates())
 def test_each_template_asks_at_most_five_questions_about_keys_that_it_has(name: str) -> None:
-    document, asked = template(name).document, QUESTIONS.get(name, ())
-    assert 3 + len(asked) <= 5
-    for _, path in asked:
+    document, questions = template(name).document, QUESTIONS.get(name, ())
+    assert 3 + len(questions) <= 5
+    for _, path in questions:
         row = row_at(document, path)
         assert row is not None
         assert row.kind in {"number", "whole number", "numbers", "vector", "either"}
@@ -85,8 +85,8 @@ def test_the_texts_of_a_template_break_only_between_paragraphs(name: str) -> Non
 def test_the_answers_are_edits_of_the_template() -> None:
     before = template("viscosity-jnd")
     references, trials = (path for _, path in QUESTIONS["viscosity-jnd"])
-    given = Answers("Which is thicker?", ("en", "de"), ((references, [4, 8]), (trials, 60)))
-    after = with_answers(before, given)
+    answers = Answers("Which is thicker?", ("en", "de"), ((references, [4, 8]), (trials, 60)))
+    after = with_answers(before, answers)
     document = after.document
     assert document["study"]["title"] == {"en": "Which is thicker?"}
     assert document["study"]["languages"] == ("en", "de")
@@ -103,11 +103,13 @@ STUDIES, SEED = 100, 1
 
 
 def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> KnownAnswer:
-    """Return what simulated studies of the first block with levels find: how the file of known answers is made.
+    """Simulate studies of the first block with levels; return the known answer, as in its file.
 
     The threshold of each person differs from ``planted`` by a factor of `BETWEEN_PEOPLE`.
     """
-    plan = next(one for block in protocol.main_blocks if (one := threshold_plan(protocol, block)) is not None)
+    plan = next(
+        block_plan for block in protocol.main_blocks if (block_plan := threshold_plan(protocol, block)) is not None
+    )
     assert protocol.analysis is not None
     people, share = protocol.analysis.participants, 100.0 if unit == "%" else 1.0
     assert people is not None
@@ -117,8 +119,8 @@ def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> Kno
     estimates = plan.simulate((plan.stimulus.coordinate(planted / share) + apart).ravel(), rng)
     means = 10.0 ** estimates.medians.reshape(STUDIES, people).mean(axis=1)
     low, high = np.quantile(means, (0.05, 0.95))
-    found, low, high = (round(share * round(float(one), 4), 4) for one in (means.mean(), low, high))
-    return KnownAnswer(planted=planted, unit=unit, source=source, people=people, found=found, low=low, high=high)
+    mean, low, high = (round(share * round(float(value), 4), 4) for value in (means.mean(), low, high))
+    return KnownAnswer(planted=planted, unit=unit, source=source, people=people, found=mean, low=low, high=high)
 
 
 @pytest.mark.slow
@@ -127,12 +129,12 @@ def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> Kno
 def test_an_adaptive_template_recovers_its_planted_threshold(name: str) -> None:
     known, protocol = known_answers()[name], template(name).protocol
     assert protocol is not None
-    found = simulated(protocol, known.planted, known.unit, known.source)
-    assert found.recovered
-    assert found == known
+    answer = simulated(protocol, known.planted, known.unit, known.source)
+    assert answer.recovered
+    assert answer == known
 
 
-def new(*words: str) -> Result:
+def run_new(*words: str) -> Result:
     return CliRunner().invoke(commands, ["new", "--no-window", *words])
 
 
@@ -144,7 +146,7 @@ def protocols(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("name", templates())
 def test_new_writes_a_sound_copy_with_its_comments_into_the_workspace(name: str, protocols: Path) -> None:
-    assert new("mine", "--template", name).exit_code == 0
+    assert run_new("mine", "--template", name).exit_code == 0
     text = (protocols / "mine.toml").read_text(encoding="utf-8")
     assert text.count("#") == (FOLDER / f"{name}.toml").read_text(encoding="utf-8").count("#")
     assert "liquid-study check mine" in text
@@ -153,9 +155,9 @@ def test_new_writes_a_sound_copy_with_its_comments_into_the_workspace(name: str,
 
 
 def test_new_refuses_to_overwrite(protocols: Path) -> None:
-    assert new("mine").exit_code == 0
+    assert run_new("mine").exit_code == 0
     before = (protocols / "mine.toml").read_bytes()
-    again = new("mine", "--template", "rate-realism")
+    again = run_new("mine", "--template", "rate-realism")
     assert isinstance(again.exception, StudyError)
     assert str(again.exception).endswith('mine.toml already exists; "mine2" is free')
     assert (protocols / "mine.toml").read_bytes() == before
@@ -170,8 +172,8 @@ def test_new_refuses_to_overwrite(protocols: Path) -> None:
         (("mine", "--template", "viscosity-jd"), 'did you mean "viscosity-jnd"'),
     ],
 )
-def test_new_refuses_what_it_cannot_make(words: tuple[str, ...], sentence: str, protocols: Path) -> None:
-    refused = new(*words)
+def test_new_refuses_impossible_studies(words: tuple[str, ...], sentence: str, protocols: Path) -> None:
+    refused = run_new(*words)
     assert isinstance(refused.exception, StudyError)
     assert sentence in str(refused.exception)
     assert "\n" not in str(refused.exception)

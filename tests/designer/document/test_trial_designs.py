@@ -122,18 +122,18 @@ def test_the_standard_is_one_of_the_blocks_conditions(study: Study) -> None:
 def test_another_standard_is_not_chosen_for_one_that_is_removed(study: Study) -> None:
     whole = after(study, SetValue(DESIGN, "abx"))
     conditions = ("blocks", "feel", "conditions")
-    one = after(whole, RemoveKey((*conditions, 0)))
-    (fault,) = one.faults
+    single = after(whole, RemoveKey((*conditions, 0)))
+    (fault,) = single.faults
     assert (fault.path, fault.hint) == (conditions, "add another condition")
     assert fault.message == "the block has one condition, but its design compares at least two"
-    for two in (
-        after(one, AddEntry(conditions, "late")),
+    for pair in (
+        after(single, AddEntry(conditions, "late")),
         after(whole, AddEntry(conditions, "late"), RemoveKey((*conditions, 0))),
     ):
-        assert two.document["blocks"]["feel"]["conditions"] == ("slime", "late")
-        assert two.document["blocks"]["feel"]["standard"] == "water"
-        (fault,) = two.faults
-        assert (fault.path[-1], [repair.label for repair in repairs(two, fault)]) == ("standard", ['Use "slime"'])
+        assert pair.document["blocks"]["feel"]["conditions"] == ("slime", "late")
+        assert pair.document["blocks"]["feel"]["standard"] == "water"
+        (fault,) = pair.faults
+        assert (fault.path[-1], [repair.label for repair in repairs(pair, fault)]) == ("standard", ['Use "slime"'])
 
 
 def test_a_repeated_form_is_counted_each_time_with_and_without_groups() -> None:
@@ -183,10 +183,10 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     chosen = next(dict(row.additions) for row in conditions if row.path[-1] == "liquid")
     named = after(study, chosen["Slime liquid, 1020 kg/m³, Maxwell"])
     assert (named.faults, named.document["conditions"]["water"]) == ((), {"liquid": "slime_2"})
-    assert "New liquid …" in chosen
+    assert "New liquid…" in chosen
     (listed,) = form_of(study, ("liquids",)).sections[0].rows
     assert dict(listed.additions)["Slime liquid, 1020 kg/m³, Maxwell"] == slime.asks
-    liquids = after(study, dict(listed.additions)["New liquid …"]).document["liquids"]
+    liquids = after(study, dict(listed.additions)["New liquid…"]).document["liquids"]
     assert len(liquids) == len(study.document["liquids"]) + 1
     beside = [entry.label for entry in addable_elements(study, ("liquids", "slime"))]
     assert beside[0] == "Liquid"
@@ -238,7 +238,7 @@ def test_numbers_and_scores_of_a_form_are_measures_of_the_block_before_it_but_te
 
 
 @pytest.mark.parametrize(
-    ("study", "block", "durations_s", "opened", "sentence"),
+    ("study", "block", "durations_s", "opened_fields", "sentence"),
     [
         (
             template("viscosity-jnd"),
@@ -264,7 +264,7 @@ def test_numbers_and_scores_of_a_form_are_measures_of_the_block_before_it_but_te
     ],
 )
 def test_the_trial_strip_has_the_duration_of_each_phase_and_the_label_of_its_field(
-    study: Study, block: str, durations_s: tuple[float, ...], opened: tuple[str, ...], sentence: str
+    study: Study, block: str, durations_s: tuple[float, ...], opened_fields: tuple[str, ...], sentence: str
 ) -> None:
     (design,) = study.document["designs"]
     for key, value in {"pause_s": 0.7, "between_s": 0.9, **({"feedback_s": 0.5} if design == "pair" else {})}.items():
@@ -273,7 +273,7 @@ def test_the_trial_strip_has_the_duration_of_each_phase_and_the_label_of_its_fie
     (strip,) = (row.facts for row in rows if row.path[-1] == "design")
     assert tuple(phase.duration_s for phase in strip.phases) == durations_s
     assert strip.duration_s == pytest.approx(sum(durations_s))
-    assert tuple(phase.opens for phase in strip.phases) == opened
+    assert tuple(phase.opens for phase in strip.phases) == opened_fields
     assert strip.sentence == f"One trial takes {sentence}."
 
 
@@ -299,10 +299,10 @@ def test_an_exclusion_rule_is_one_that_can_apply_and_has_its_usual_limit(study: 
     assert "limit" not in back.document["analysis"]["exclusions"][0]
 
 
-def test_the_form_of_the_analysis_begins_a_hypothesis_with_what_it_compares(study: Study) -> None:
-    two = after(study, SetValue(DESIGN, "abx"), SetValue(("analysis", "participants"), 16))
-    two, _ = two.with_edits(*edits_to_duplicate(two, DESIGN[:2])[0])
-    rows = [row for section in form_of(two, ("analysis",)).sections for row in section.rows]
+def test_the_form_of_the_analysis_lists_a_hypothesis_for_each_block(study: Study) -> None:
+    copied = after(study, SetValue(DESIGN, "abx"), SetValue(("analysis", "participants"), 16))
+    copied, _ = copied.with_edits(*edits_to_duplicate(copied, DESIGN[:2])[0])
+    rows = [row for section in form_of(copied, ("analysis",)).sections for row in section.rows]
     assert len(next(row.facts for row in rows if row.path == ("analysis", "contrasts")).items) == 2
 
 

@@ -41,7 +41,7 @@ def study_named(name: str) -> Study:
 
 
 def translated(study: Study, code: str) -> Study:
-    """Return the study with every text of a language replaced, as a person does it: all of it in that language."""
+    """Return the study with every text of a language replaced by a translation."""
     for number, (path, value) in enumerate(localised_texts(study)):
         place = (*path, code) if not isinstance(value, str) else path
         text = value if isinstance(value, str) else value[code]
@@ -54,7 +54,7 @@ def translated(study: Study, code: str) -> Study:
 
 @pytest.mark.parametrize("code", CODES)
 @pytest.mark.parametrize("name", [*templates(), "demo", "thickness", "delayjnd", "forcedelay"])
-def test_every_english_text_of_a_study_in_another_language_alone_is_to_be_translated(name: str, code: str) -> None:
+def test_every_english_text_of_a_study_in_another_language_needs_translation(name: str, code: str) -> None:
     english = study_named(name)
     texts = [text for _, text in localised_texts(english) if words_in(text)]
     same = sum(isinstance(text, str) and text.casefold() in SAME_WORDS.get(code, ()) for text in texts)
@@ -66,7 +66,7 @@ def test_every_english_text_of_a_study_in_another_language_alone_is_to_be_transl
         check_translated(study.document)
 
 
-def test_the_count_goes_down_with_each_text_and_ends_at_none() -> None:
+def test_the_count_falls_with_each_text_to_zero() -> None:
     study = with_answers(template("rate-realism"), Answers("Ça fait vrai ?", ("fr",)))
     assert lines_of(study) == [
         "tasks.explore.instruction: 16 texts are still in English, but the study's only language is French; "
@@ -74,12 +74,14 @@ def test_the_count_goes_down_with_each_text_and_ends_at_none() -> None:
     ]
     study, _ = study.with_edits(Set(("pages", "welcome", "title", "fr"), "Bienvenue"))
     assert copied_texts(study) == {"fr": 15}
-    done = translated(study, "fr")
-    assert (copied_texts(done), lines_of(done)) == ({}, [])
-    check_translated(done.document)
-    almost, _ = done.with_edits(Set(("pages", "thanks", "button", "fr"), "Finish"))
-    told = "study.languages: 1 text is still in English, but the study's only language is French: pages.thanks.button"
-    assert list(describe_untranslated(almost.document, lists_places=True)) == [told]
+    finished = translated(study, "fr")
+    assert (copied_texts(finished), lines_of(finished)) == ({}, [])
+    check_translated(finished.document)
+    almost, _ = finished.with_edits(Set(("pages", "thanks", "button", "fr"), "Finish"))
+    sentence = (
+        "study.languages: 1 text is still in English, but the study's only language is French: pages.thanks.button"
+    )
+    assert list(describe_untranslated(almost.document, lists_places=True)) == [sentence]
     check_translated(almost.document)  # French might have the same word
     almost, _ = almost.with_edits(Set(("pages", "thanks", "title", "fr"), "Thank you"))
     with pytest.raises(SessionError, match=r"2 texts on French pages .* pages\.thanks\.title,"):
@@ -150,7 +152,7 @@ def test_a_copy_of_an_own_study_is_recognised_and_warned_of(tmp_path: Path) -> N
     assert copied_texts(french) == {}
 
 
-def test_a_language_that_was_added_and_then_left_alone_keeps_its_copies() -> None:
+def test_an_added_language_without_edits_keeps_its_copies() -> None:
     study, _ = template("empty").with_edits(*edits_to_add_language(template("empty"), "ar"))
     study, _ = study.with_edits(*edits_to_fill_in(study, "ar"))
     study, _ = study.with_edits(*edits_to_remove_language(study, "en"))

@@ -1,4 +1,4 @@
-"""The writer of TOML: comments and style stay, and undo gives every byte back."""
+"""The TOML writer: comments and style stay, and undo restores every byte."""
 
 import os
 import tomllib
@@ -41,13 +41,13 @@ STEPS = 16
         ("aa", "aaaa", 2, "", "aa"), ("", "honey", 0, "", "honey"), ("aaaa", "aa", 2, "aa", ""),
     ],
 )  # fmt: skip
-def test_a_typed_text_replaces_only_what_differs(old: str, new: str, at: int, before: str, after: str) -> None:
+def test_a_typed_text_replaces_only_the_difference(old: str, new: str, at: int, before: str, after: str) -> None:
     study, (((splice,)),) = Study(old).with_text(new)
     assert (study.text, splice.start, splice.before, splice.after) == (new, at, before, after)
 
 
 class Edited(RuleBasedStateMachine):
-    """A study that is edited; ``texts`` are those before each step that can be undone, and the one now."""
+    """A state machine of an edited study; ``texts`` are those before each undoable step, and the present one."""
 
     @initialize(name=st.sampled_from([*TEXTS, *["grown", "grown, \\r\\n"] * 8]))
     def open(self, name: str) -> None:
@@ -57,13 +57,13 @@ class Edited(RuleBasedStateMachine):
     @rule(seed=st.integers(0, 2**32))
     def edit(self, seed: int) -> None:
         edit = edit_of(Random(seed), self.texts[-1])  # noqa: S311
-        study, done = self.document.study, len(self.document.done)
+        study, step_count = self.document.study, len(self.document.done)
         try:
             self.document.edit("Edit", edit)
         except StudyError:
             return
         check_edit(study.text, self.document.study.text, edit)
-        if len(self.document.done) > done:
+        if len(self.document.done) > step_count:
             self.texts.append(self.document.study.text)
             self.undone.clear()
 
@@ -100,7 +100,7 @@ class Edited(RuleBasedStateMachine):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_edits_change_what_is_meant_keep_comments_and_undo_gives_every_byte_back() -> None:
+def test_edits_change_only_their_target_keep_comments_and_undo_restores_every_byte() -> None:
     run_state_machine_as_test(
         Edited,
         settings=settings(
@@ -258,7 +258,7 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
         (Insert(("t", 0), 5), "each entry in an array of tables must be a table"),
     ],
 )
-def test_apply_refuses_what_makes_no_sense(edit: Edit, sentence: str) -> None:
+def test_apply_refuses_impossible_edits(edit: Edit, sentence: str) -> None:
     with pytest.raises(StudyError, match=sentence):
         apply_edit("a = 1\nl = [1, 2]\n[[t]]\nx = 1\n", edit)
 

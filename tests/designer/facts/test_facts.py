@@ -1,4 +1,4 @@
-"""What is shown of a study, sound or not: uses of elements, forms, the file with its marks, measures."""
+"""Facts about a study, sound or not: uses of elements, forms, the marked file, measures."""
 
 import pathlib
 from typing import Any
@@ -40,11 +40,11 @@ def study_of(file: pathlib.Path) -> Study:
         ("delayjnd", ("liquids", "water"), "used by 1 stimulus"),
     ],
 )
-def test_what_is_the_only_one_is_used_where_its_name_is_left_out(name: str, path: Path, words: str) -> None:
+def test_the_only_element_is_used_where_its_name_is_omitted(name: str, path: Path, words: str) -> None:
     assert usage_text(study_of(PROTOCOLS / f"{name}.toml").document, path) == words
 
 
-def test_liquids_are_used_as_conditions_where_a_study_has_none() -> None:
+def test_liquids_are_used_as_conditions_of_a_study_without_conditions() -> None:
     document = {"liquids": {"water": {}, "oil": {}}, "blocks": {"one": {"conditions": ("water",)}}}
     assert [usage_text(document, ("liquids", name)) for name in ("water", "oil")] == ["used by 1 block", "not used"]
 
@@ -61,10 +61,10 @@ def test_a_reference_names_its_target_or_is_left_out(file: pathlib.Path) -> None
 
 
 @pytest.mark.parametrize("file", [*PROTOCOLS.glob("*.toml"), *FOLDER.glob("*.toml")], ids=lambda file: file.stem)
-def test_what_is_not_used_can_be_deleted(file: pathlib.Path) -> None:
+def test_unused_elements_can_be_deleted(file: pathlib.Path) -> None:
     study = study_of(file)
     elements = (path for path, _ in entries(study.document, "*.*"))
-    for path in [one for one in elements if usage_text(study.document, one) == "not used"]:
+    for path in [element for element in elements if usage_text(study.document, element) == "not used"]:
         assert study.with_edits(Unset(path))[0].faults == study.faults, path
 
 
@@ -113,8 +113,8 @@ def study() -> Study:
     return read_study(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
 
 
-def shown(text: str) -> str:
-    """Return a text as the pane shows it: each end of a line is one character."""
+def as_shown(text: str) -> str:
+    """Return a text with line ends as in the pane, one character each."""
     return text.replace("\r\n", "\n")
 
 
@@ -125,12 +125,12 @@ ENDS = st.sampled_from(["\n", "\r\n"])
 @given(st.lists(st.tuples(st.sampled_from(["a", "b = 1", "# é😀\u00a0", ""]), ENDS), max_size=8), st.data())
 def test_typing_changes_no_end_of_line_elsewhere(lines: list[tuple[str, str]], data: st.DataObject) -> None:
     text = "".join(line + end for line, end in lines)
-    pane = shown(text)
+    pane = as_shown(text)
     first = data.draw(st.integers(0, len(pane)))
     last = data.draw(st.integers(first, len(pane)))
     typed = pane[:first] + data.draw(st.sampled_from(["", "x", "new\nline", "\n"])) + pane[last:]
     after = RetypeFile(typed).step(StepContext(Study(text), ())).text
-    assert shown(after) == typed
+    assert as_shown(after) == typed
     if typed == pane:
         assert after == text
     shortest = 0
@@ -145,22 +145,22 @@ def test_typing_changes_no_end_of_line_elsewhere(lines: list[tuple[str, str]], d
 def test_the_selected_element_and_faulty_lines_are_marked(newline: str) -> None:
     text = shipped_file("rek2024").read_text(encoding="utf-8").replace("\n", newline)
     text = text.replace('order = "shuffled"', 'order = "shufled"', 1)
-    found = file_text(read_study(text.encode()), "x.toml", ("blocks", "liquids"))
-    lines = found.text.split("\n")
-    (first, last), *others = found.selected
+    shown_file = file_text(read_study(text.encode()), "x.toml", ("blocks", "liquids"))
+    lines = shown_file.text.split("\n")
+    (first, last), *others = shown_file.selected
     assert not others
     assert lines[first] == "[blocks.liquids]"
     assert lines[last].startswith("questionnaire = ")
-    assert [lines[line] for line in found.faulty] == ['order = "shufled"']
+    assert [lines[line] for line in shown_file.faulty] == ['order = "shufled"']
 
 
 FILES = [*(shipped_file(name) for name in shipped()), *(FOLDER / f"{name}.toml" for name in templates())]
 
 
 def leaves(value: Any, path: tuple[Any, ...] = ()) -> set[tuple[Any, ...]]:
-    """The keys of an element, those of tables within it too; entries of lists are forms of their own."""
+    """Return the keys of an element and of its tables; entries of lists are forms of their own."""
     if isinstance(value, dict) and (value or not path):
-        return {found for key, inner in value.items() for found in leaves(inner, (*path, key))}
+        return {leaf for key, inner in value.items() for leaf in leaves(inner, (*path, key))}
     return {path}
 
 
@@ -168,29 +168,29 @@ def leaves(value: Any, path: tuple[Any, ...] = ()) -> set[tuple[Any, ...]]:
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_every_key_of_every_element_is_in_its_form_with_its_value(file: pathlib.Path) -> None:
     study = read_study(file.read_bytes(), file.parent)
-    listed = outline(study)
-    for element in {one.path for one in (*listed.session, *listed.parts, *listed.study)}:
+    listed_rows = outline(study)
+    for element in {row.path for row in (*listed_rows.session, *listed_rows.parts, *listed_rows.study)}:
         if len(element) == 1 and element[0] not in {"study", "device", "scene", "limits", "analysis"}:
             continue
         if value_at(study.document, element) is None:
             continue
-        made = form_of(study, element)
-        rows = {row.path: row.value for row in made.rows}
+        form = form_of(study, element)
+        rows = {row.path: row.value for row in form.rows}
         for leaf in leaves(value_at(study.document, element), element):
             if leaf[-1] == "id" and len(leaf) > 3:
-                assert made.id is not None
+                assert form.id is not None
                 continue
             around = next((leaf[:length] for length in range(len(leaf), 0, -1) if leaf[:length] in rows), None)
             assert around is not None, leaf
             assert rows[around] == value_at(study.document, around)
 
 
-def test_the_form_of_an_unreadable_file_says_in_which_line_the_problem_is() -> None:
-    made = form_of(Study("format = 1\n\n[study\nname = 5\n"), ("pages", "welcome"))
-    (sentence,) = made.faults
+def test_the_form_of_an_unreadable_file_names_the_line_of_the_problem() -> None:
+    form = form_of(Study("format = 1\n\n[study\nname = 5\n"), ("pages", "welcome"))
+    (sentence,) = form.faults
     assert sentence.startswith("Line 3: ")
     assert sentence[len("Line 3: ")].isupper()
-    assert (made.path, made.kind, made.unreadable) == (("study",), "Correct the text in the File tab", True)
+    assert (form.path, form.kind, form.unreadable) == (("study",), "Correct the text in the File tab", True)
 
 
 def test_hypotheses_compare_every_number_that_is_asked_after_trials() -> None:

@@ -1,4 +1,4 @@
-"""What the designer shows of a study: each element once, repairs that repair, and the words of measures."""
+"""The designer's view of a study: each element once, working repairs, and texts of measures."""
 
 import re
 from collections import Counter
@@ -36,17 +36,17 @@ STUDIES = ("rows", "sound", "every_design", "grouped", "slime")
 """Studies of which each has kinds of elements that none before it has; the first is short."""
 
 
-@pytest.mark.parametrize("name", [STUDIES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in STUDIES[1:])])
+@pytest.mark.parametrize("name", [STUDIES[0], *(pytest.param(name, marks=pytest.mark.slow) for name in STUDIES[1:])])
 def test_the_outline_shows_each_element_once_with_its_name(name: str) -> None:
     ((_, study),) = studies((name,))
     rows = outline_rows(study, facts(study).steps_s)
     parts = rows[next(at for at, row in enumerate(rows) if row.title == "Elements") :]
-    shown, in_parts = Counter(row.path for row in rows), Counter(row.path for row in parts)
+    row_counts, in_parts = Counter(row.path for row in rows), Counter(row.path for row in parts)
     for path in elements(study.document):
         if len(path) == 1 and path[0] in {*SINGLE} & {*study.document}:
-            assert shown[path] == 1, path
+            assert row_counts[path] == 1, path
         elif path[2:3] == ("items",):
-            assert shown[path] >= 1, "below each step that asks it"
+            assert row_counts[path] >= 1, "below each step that asks it"
         elif len(path) == 2 and path[0] not in SINGLE:
             assert in_parts[path] == 1, path
     for row in rows:
@@ -64,25 +64,25 @@ def test_a_search_finds_the_section_of_elements_that_do_not_exist_yet() -> None:
 
 
 @pytest.mark.parametrize("words", ["viscosity", "hon", "order"])
-def test_what_is_found_has_the_words(words: str) -> None:
+def test_found_rows_contain_the_words(words: str) -> None:
     ((_, study),) = studies(("slime",))
-    found = outline_rows(study, facts(study).steps_s, words)
+    matching_rows = outline_rows(study, facts(study).steps_s, words)
     everything = outline_rows(study, facts(study).steps_s)
-    assert {row.path for row in found} <= {row.path for row in everything}
-    assert outline_rows(study, facts(study).steps_s, f"  {words} ") == found
+    assert {row.path for row in matching_rows} <= {row.path for row in everything}
+    assert outline_rows(study, facts(study).steps_s, f"  {words} ") == matching_rows
     assert outline_rows(study, facts(study).steps_s, "  ") == everything
     fields = find_fields(study, words)
-    assert found or fields
-    for row in (*found, *fields):
-        assert words in one_line(row).lower() or any(words in one_line(other).lower() for other in found), row
+    assert matching_rows or fields
+    for row in (*matching_rows, *fields):
+        assert words in one_line(row).lower() or any(words in one_line(other).lower() for other in matching_rows), row
 
 
 @pytest.mark.parametrize(("words", "rank"), [("repetitions", LABEL), ("double", CHOSEN), ("ewma", OTHER)])
-def test_other_choices_are_found_only_where_no_label_and_no_chosen_one_is(words: str, rank: int) -> None:
+def test_other_choices_are_found_only_if_neither_label_nor_chosen_value_matches(words: str, rank: int) -> None:
     ((_, study),) = studies(("slime",))
-    found = find_fields(study, words)
-    assert found[0].rank == rank
-    assert all(field.rank <= max(rank, CHOSEN) for field in found)
+    fields = find_fields(study, words)
+    assert fields[0].rank == rank
+    assert all(field.rank <= max(rank, CHOSEN) for field in fields)
 
 
 def card_lines() -> Iterator[str]:
@@ -100,7 +100,7 @@ def card_lines() -> Iterator[str]:
 
 
 @pytest.mark.slow
-def test_what_measures_say() -> None:
+def test_texts_of_measures() -> None:
     words = (line.strip() for line in card_lines() if not re.search(r"icon:|path:", line))
     check_kept(File(__file__).with_name("measures.txt"), dict.fromkeys(words))
 
@@ -123,7 +123,7 @@ FAULTS = ("designs", "formats", "adjustment", "groups", "impossible", "methods",
 """Files of faults that together have each kind of repair; the first two are read fastest."""
 
 
-@pytest.mark.parametrize("name", [*FAULTS[:2], *(pytest.param(one, marks=pytest.mark.slow) for one in FAULTS[2:])])
+@pytest.mark.parametrize("name", [*FAULTS[:2], *(pytest.param(name, marks=pytest.mark.slow) for name in FAULTS[2:])])
 def test_each_repair_removes_its_problem_and_undo_gives_the_text_back(name: str, pytestconfig: pytest.Config) -> None:
     words = list[str]()
     for case in cases_of(CASES / f"{name}.txt"):
@@ -134,7 +134,7 @@ def test_each_repair_removes_its_problem_and_undo_gives_the_text_back(name: str,
         for fault in study.faults:
             for repair in (*repairs(study, fault), *addition_repairs(study, fault)):
                 after = edited(study, *repair.edits)
-                known, left = ({(fault.path, fault.message) for fault in one.faults} for one in (study, after))
+                known, left = ({(fault.path, fault.message) for fault in checked.faults} for checked in (study, after))
                 assert (fault.path, fault.message) not in left, (case.name, repair.label)
                 assert len(left) <= len(known), (case.name, repair.label)
                 words.append(repair.label)

@@ -1,4 +1,4 @@
-"""The tab Measures with a worker of simulations that answers when a test says so."""
+"""The tab Measures with a simulation worker whose answers a test sends."""
 
 from typing import Any
 
@@ -10,11 +10,11 @@ TABLE = "# Power\n\n| participants | power |\n|---:|---:|\n| 12 | 80% |\n"
 
 
 class Worker:
-    """Stands for the worker process: answers come when a test gives them."""
+    """A replacement of the worker process whose answers a test sends."""
 
     def __init__(self) -> None:
         self.orders: list[Simulation] = []
-        self.given: list[tuple[int, Any]] = []
+        self.pending_answers: list[tuple[int, Any]] = []
         self.stops = 0
         self.works = True
 
@@ -29,22 +29,22 @@ class Worker:
         self.works = False
 
     def answers(self, wait_s: float = 0.0) -> list[tuple[int, Any]]:
-        given, self.given = self.given, []
-        return given
+        answers, self.pending_answers = self.pending_answers, []
+        return answers
 
     def answer(self, waiting: str = "") -> None:
         """Answer the last order, in part if it is still ``waiting``."""
         warnings = ("methods.adaptive.trials: more trials",)
-        self.given.append((len(self.orders), Simulated(warnings=warnings, table=TABLE, waiting=waiting)))
+        self.pending_answers.append((len(self.orders), Simulated(warnings=warnings, table=TABLE, waiting=waiting)))
 
 
 @pytest.fixture
 def worker(designer: Any) -> Worker:
-    made = Worker()
+    worker = Worker()
     measures = designer.controller.measures
-    measures.make = lambda: made
+    measures.make = lambda: worker
     measures.rest.setInterval(30)
-    return made
+    return worker
 
 
 def open_viscosity_block(designer: Any) -> None:

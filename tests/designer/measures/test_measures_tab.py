@@ -17,7 +17,7 @@ from study_app.workers.server import Crashed
 from tests.designer.measures.conftest import Worker, open_viscosity_block
 
 pytestmark = pytest.mark.slow
-WAITING = "simulating …"
+WAITING = "simulating…"
 
 
 def test_power_is_shown_in_parts_cancelled_by_an_edit_and_kept(qtbot: Any, designer: Any, worker: Worker) -> None:
@@ -66,7 +66,7 @@ def test_other_tabs_order_the_warnings_without_the_power(qtbot: Any, designer: A
 
 
 @pytest.mark.parametrize("starts", [True, False])
-def test_a_failed_simulation_says_why(qtbot: Any, designer: Any, worker: Worker, starts: bool) -> None:
+def test_a_failed_simulation_states_the_reason(qtbot: Any, designer: Any, worker: Worker, starts: bool) -> None:
     def fail() -> Any:
         raise OSError
 
@@ -76,7 +76,7 @@ def test_a_failed_simulation_says_why(qtbot: Any, designer: Any, worker: Worker,
     progress = designer.place.measures.power.progress
     if starts:
         qtbot.waitUntil(lambda: bool(worker.orders))
-        worker.given.append((1, Crashed(1)))
+        worker.pending_answers.append((1, Crashed(1)))
         sentence = "The process ended with exit code 1; the terminal may show why."
     else:
         sentence = "The simulation process could not be started."
@@ -140,9 +140,9 @@ def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
     (file.parent / "data" / "sub-P001" / "ses-01").mkdir(parents=True)
     file.write_bytes(b"\xff another program's text")
     write.click()
-    said = " ".join(one.text() for one in designer.place.prompt.findChildren(QLabel))
-    assert f"{file} differs from the text generated" in said
-    assert "already has 1 session; the text cannot preregister data that already exist" in said
+    prompt_text = " ".join(label.text() for label in designer.place.prompt.findChildren(QLabel))
+    assert f"{file} differs from the text generated" in prompt_text
+    assert "already has 1 session; the text cannot preregister data that already exist" in prompt_text
     designer.place.prompt.confirm.click()
     written = designer.messages.pop()[1]
     assert "The study already has 1 session" in written
@@ -154,12 +154,12 @@ def test_a_preregistration_can_be_opened_and_is_compared_with_the_saved_study(
 ) -> None:
     open_viscosity_block(designer)
     designer.saving.save()
-    power, opened = designer.place.measures.power, list[Path]()
+    power, files = designer.place.measures.power, list[Path]()
     power.preregister.click()
-    monkeypatch.setattr(main_window, "open_here", opened.append)
+    monkeypatch.setattr(main_window, "open_here", files.append)
     buttons = {button.text(): button for button in designer.window.notice.findChildren(ActionButton)}
     buttons["Open the file"].click()
-    assert opened == [designer.results / "thicker" / "preregistration.md"]
+    assert files == [designer.results / "thicker" / "preregistration.md"]
     designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 70))
     qtbot.wait(50)
     assert not power.changed.isVisible()  # it is the saved study that was preregistered
@@ -176,7 +176,7 @@ def test_trials_that_would_be_lost_are_shown_above_the_power(qtbot: Any, designe
     lost = designer.place.measures.power.lost
     qtbot.waitUntil(lambda: bool(worker.orders))
     assert not lost.isVisible()
-    worker.given.append((1, Simulated(lost=("4 of 4 trials would not be delivered",), waiting=WAITING)))
+    worker.pending_answers.append((1, Simulated(lost=("4 of 4 trials would not be delivered",), waiting=WAITING)))
     qtbot.waitUntil(lost.isVisible)
     assert lost.text() == "4 of 4 trials would not be delivered."
 
@@ -190,10 +190,10 @@ def test_cards_fill_two_columns_and_a_wide_or_last_one_takes_both(qtbot: Any) ->
     ):
         before = {part.shown.title: part for part in grid.parts}
         grid.show_cards(tuple(MeasureCard(title, wide=title.isupper()) for title in titles))
-        shown = {part.shown.title: part for part in grid.parts}
-        assert {title: grid.grid.getItemPosition(grid.grid.indexOf(part)) for title, part in shown.items()} == places
+        parts = {part.shown.title: part for part in grid.parts}
+        assert {title: grid.grid.getItemPosition(grid.grid.indexOf(part)) for title, part in parts.items()} == places
         assert not any(grid.grid.rowStretch(row) for row, *_ in places.values())
-    assert (shown["a"], shown["C"] is before["C"]) == (before["a"], False), "the same card at the same place is kept"
+    assert (parts["a"], parts["C"] is before["C"]) == (before["a"], False), "the same card at the same place is kept"
 
 
 def test_a_process_that_has_ended_is_replaced_and_a_late_answer_is_ignored(
@@ -208,7 +208,7 @@ def test_a_process_that_has_ended_is_replaced_and_a_late_answer_is_ignored(
     qtbot.waitUntil(lambda: bool(second.orders))
     assert second.orders[0].protocol.methods["adaptive"].trials == 60
     second.answer()
-    second.given += [(7, Simulated(table="the answer to another order"))]
+    second.pending_answers += [(7, Simulated(table="the answer to another order"))]
     qtbot.waitUntil(lambda: not power.progress.isVisible())
     assert "| 12 | 80% |" in power.table.text()
     designer.controller.begin_study("template:delay-detection", "later")

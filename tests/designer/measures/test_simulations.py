@@ -58,7 +58,7 @@ def test_the_process_shows_the_output_of_the_command_power(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_warnings_that_take_simulated_observers_are_those_of_check() -> None:
+def test_warnings_by_simulated_observers_equal_those_of_check() -> None:
     study = template("viscosity-jnd").with_edits(Set(("analysis", "participants"), 4))[0]
     protocol = study.protocol
     assert protocol is not None
@@ -73,8 +73,8 @@ def test_a_simulation_ends_between_two_batches() -> None:
     with pytest.raises(Stopped):
         run_simulation(order(short_study()), sent.append, lambda: any(answer.table for answer in sent))
     assert [answer.waiting for answer in sent] == [
-        "predicting which trials can be delivered …",
-        "simulating observers …",
+        "predicting which trials can be delivered…",
+        "simulating observers…",
         "10 of 200 studies simulated per sample size",
     ]
     assert [bool(answer.table) for answer in sent] == [False, False, True]

@@ -106,7 +106,7 @@ def test_the_balance_counts_positions_and_successions_of_each_code() -> None:
          "Positions and carry-over are balanced for any multiple of 4 participants."),
     ],
 )  # fmt: skip
-def test_the_form_says_for_how_many_participants_an_order_is_balanced(
+def test_the_form_states_the_participants_needed_for_a_balanced_order(
     order: str, conditions: int, repetitions: int, chip: tuple[str, str, str], sentence: str
 ) -> None:
     study = study_with_order(order, conditions, repetitions=repetitions)
@@ -142,7 +142,7 @@ def test_the_precision_is_simulated_only_if_it_and_the_participants_are_planned(
     assert simulation_of(incomplete.protocol, power=True) is not None
 
 
-def test_a_simulation_sends_what_is_known_and_ends_with_all_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_simulation_sends_partial_results_and_ends_with_the_complete_one(monkeypatch: pytest.MonkeyPatch) -> None:
     protocol = template("viscosity-jnd").protocol
     assert protocol is not None
     order = simulation_of(protocol, power=True)
@@ -167,8 +167,8 @@ def test_a_simulation_sends_what_is_known_and_ends_with_all_of_it(monkeypatch: p
     known = [(answer.waiting, answer.table, answer.lost, answer.warnings) for answer in (*sent, last)]
     lost, warnings = delivery.sentences, tuple(f"{block.id} is imprecise" for block in protocol.main_blocks)
     assert known == [
-        ("predicting which trials can be delivered …", "", (), warnings),
-        ("felt …", "", lost, warnings),
+        ("predicting which trials can be delivered…", "", (), warnings),
+        ("felt…", "", lost, warnings),
         ("32 of 70 studies simulated per sample size", "32 simulated", lost, warnings),
         ("27 of 70 studies simulated per sample size", "27 simulated", lost, warnings),
         ("", "27 simulated", lost, warnings),

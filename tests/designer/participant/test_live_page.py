@@ -32,19 +32,19 @@ ITEM = ("questionnaires", "liquid", "items", 1)
 
 @pytest.fixture
 def live(designer: Any) -> Any:
-    """The live page of the open study, with the question "Like honey" selected."""
+    """Return the live page of the open study, with the question "Like honey" selected."""
     designer.open("kitchen", *ITEM)
     QApplication.processEvents()
     return designer.controller.preview.page
 
 
 def answers(live: Any) -> dict[str, Any]:
-    """Return what is answered on the page."""
+    """Return the answers on the page."""
     return {field.view.id: field.value for field in live.page_window.widget.fields if field.is_answered}
 
 
 def place_of(live: Any, part: Any) -> QPoint:
-    """Return where the middle of a part of the page is in the view."""
+    """Return the centre of a widget of the page in view coordinates."""
     middle = part.mapTo(live.page_window, part.rect().center())
     return live.mapFromScene(QPointF(middle))
 
@@ -73,8 +73,8 @@ def test_a_trial_is_stepped_to_and_played(designer: Any) -> None:
         ("thanks", "Thank you", True, False),
     ):
         designer.go_to("pages", page)
-        found = preview.step.text(), preview.before.isEnabled(), preview.after.isEnabled()
-        assert found == (title, has_before, has_after)
+        header = preview.step.text(), preview.before.isEnabled(), preview.after.isEnabled()
+        assert header == (title, has_before, has_after)
 
 
 def test_keys_answer_the_page_and_go_on_and_esc_leaves_it(qtbot: Any, designer: Any, live: Any) -> None:
@@ -133,8 +133,8 @@ def test_an_edit_repaints_the_page_and_keeps_answers_and_focus_where_they_were(d
     line.setFocus()
     typing = designer.keyboard
     designer.editing.handle_request(SetText((*ITEM, "text"), "en", "This is like honey."))
-    shown = next(one for one in live.page_window.widget.fields if one.view.id == "like_honey")
-    assert shown.statement.text == "This is like honey."
+    field = next(field for field in live.page_window.widget.fields if field.view.id == "like_honey")
+    assert field.statement.text == "This is like honey."
     assert answers(live) == {"like_honey": 2}
     assert designer.keyboard is typing
 
@@ -154,12 +154,12 @@ def test_an_edit_repaints_the_page_and_keeps_answers_and_focus_where_they_were(d
         Set(("format",), 9),
     ],
 )
-@pytest.mark.parametrize("opened", ["sound", "faulty, saved before"])
-def test_no_fault_blanks_the_page(designer: Any, broken: Any, opened: str) -> None:
+@pytest.mark.parametrize("state", ["sound", "faulty, saved before"])
+def test_no_fault_blanks_the_page(designer: Any, broken: Any, state: str) -> None:
     designer.open("kitchen", "pages", "welcome")
     designer.editing.make_step("Another version", Set(("study", "version"), "2"))
     designer.saving.save()
-    if opened == "sound":
+    if state == "sound":
         designer.editing.make_step("Break it", broken)
     else:
         designer.file.write_text(
@@ -213,7 +213,7 @@ def test_frames_are_due_while_a_tank_is_visible_and_again_when_it_is_shown_again
 @pytest.mark.variants(4)
 @pytest.mark.parametrize("screen", [0, 1])
 @pytest.mark.parametrize("path", [ITEM, ("pages", "welcome"), ("questionnaires", "delay"), ("liquids", "thick")])
-def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
+def test_at_100_percent_the_page_equals_that_of_a_session_pixel_by_pixel(
     qtbot: Any, designer: Any, live: Any, path: Any, screen: int
 ) -> None:
     tab = designer.controller.preview
@@ -237,16 +237,16 @@ def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
         session.show_view(view)
         live.show_tank(view)
     QApplication.processEvents()
-    shown, held = (image(part) for part in (live.viewport(), session))
+    page_pixels, session_pixels = (pixels_of(part) for part in (live.viewport(), session))
     session.may_close = True
     session.close()
     session.deleteLater()
-    assert shown.shape == held.shape == (size.height(), size.width(), 3)
-    assert held.std() > 5
-    assert (shown != held).sum() == 0
+    assert page_pixels.shape == session_pixels.shape == (size.height(), size.width(), 3)
+    assert session_pixels.std() > 5
+    assert (page_pixels != session_pixels).sum() == 0
 
 
-def image(part: Any) -> Any:
+def pixels_of(part: Any) -> Any:
     """Return the pixels of a widget."""
     grabbed = part.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     rows = np.frombuffer(grabbed.constBits(), np.uint8).reshape(grabbed.height(), grabbed.bytesPerLine() // 4, 4)
@@ -317,7 +317,7 @@ def test_a_copied_question_has_the_text_of_its_original_and_the_others_keep_thei
     assert dict(statements(tab))["like_honey_2"] == "Another statement"
 
 
-def test_a_note_on_a_problem_says_which_of_two_elements_of_the_same_title_has_it(designer: Any, tab: Any) -> None:
+def test_a_note_on_a_problem_distinguishes_elements_of_the_same_title(designer: Any, tab: Any) -> None:
     for key, value in (("title", "Liquids"), ("repetitions", -1)):
         designer.editing.handle_request(SetValue(("blocks", "delays", key), value))
     assert "There is 1 problem elsewhere (Block delays), so the last valid values" in tab.view.note
@@ -342,7 +342,7 @@ def test_the_note_counts_the_missing_texts_of_a_language_once_as_the_header_does
     designer.editing.handle_request(SetValue(("device", "force_limit_n"), 60))
     assert "There are 2 problems elsewhere (the first: " in tab.view.note
     designer.editing.handle_request(SetText(("pages", "thanks", "title"), "nl", "Dank u"))
-    assert designer.value("pages", "thanks", "title") == {"en": "That was it", "nl": "Dank u"}
+    assert designer.value("pages", "thanks", "title") == {"en": "The end", "nl": "Dank u"}
 
 
 def test_the_page_has_the_language_of_the_text_that_is_edited(designer: Any, tab: Any, qtbot: Any) -> None:
@@ -356,15 +356,15 @@ def test_the_page_has_the_language_of_the_text_that_is_edited(designer: Any, tab
 
 
 def test_each_trial_keeps_the_answers_that_were_given_in_it(designer: Any, live: Any) -> None:
-    preview, found = designer.controller.preview, []
+    preview, steps = designer.controller.preview, []
     for answer in (2, 6):
         assert answers(live) == {}
         live.page_window.widget.fields[0].give_answer(answer)
         designer.click_on(preview.after)
     for _ in range(2):
         designer.click_on(preview.before)
-        found.append((preview.step.text(), *answers(live).values()))
-    assert found == [("Liquids, trial 2 of 2", 6), ("Liquids, trial 1 of 2", 2)]
+        steps.append((preview.step.text(), *answers(live).values()))
+    assert steps == [("Liquids, trial 2 of 2", 6), ("Liquids, trial 1 of 2", 2)]
 
 
 def test_an_answer_that_was_emptied_does_not_come_back_when_the_page_is_repainted(designer: Any, live: Any) -> None:

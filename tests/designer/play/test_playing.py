@@ -1,4 +1,4 @@
-"""Play from here in its window: by F5, to the end and stopped, its data kept and deleted, and nothing left over."""
+""" "Play from here" in its window: by F5, to the end and stopped, with data kept or deleted, without leftovers."""
 
 import json
 import re
@@ -40,7 +40,7 @@ SESSION_MS = 120_000
 
 
 class Player(QObject):
-    """Answers every page by keys; the scripted hand moves. ``pages`` are those that were seen."""
+    """A player who answers every page by keys, with a scripted hand; ``pages`` are the shown ones."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -69,18 +69,23 @@ class Player(QObject):
 
 @pytest.fixture
 def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the temporary folders of pilots are."""
-    made = tmp_path / "temporary"
-    made.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(made))
-    return made
+    """Return the folder of the temporary folders of pilots."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
 
 
 @pytest.fixture
 def likert(designer: Any) -> Any:
-    """The workspace's study with tasks of a second, open."""
+    """Return the designer with the workspace's study, whose tasks last a second."""
     text = designer.file.read_text("utf-8")
-    for key, value in (("min_s", "0.3"), ("count", "1"), ("dwell_s", "0.05"), *((one, "1000") for one in UNLIMITED)):
+    for key, value in (
+        ("min_s", "0.3"),
+        ("count", "1"),
+        ("dwell_s", "0.05"),
+        *((limit, "1000") for limit in UNLIMITED),
+    ):
         text = re.sub(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
     designer.file.write_text(text, encoding="utf-8", newline="\n")
     designer.open()
@@ -113,7 +118,7 @@ def play_to_the_end(qtbot: Any, designer: Any) -> Player:
     return player
 
 
-def kept(qtbot: Any, designer: Any) -> Path:
+def keep_pilot(qtbot: Any, designer: Any) -> Path:
     qtbot.mouseClick(designer.place.header.strip.buttons["keep"], Qt.MouseButton.LeftButton)
     (study,) = designer.results.iterdir()
     assert verify_study(study).is_sound, verify_study(study)
@@ -129,19 +134,19 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     assert not player.operated
     assert "completed" in likert.place.header.strip.sentence.text()
     assert list(folders.iterdir())
-    study = kept(qtbot, likert)
+    study = keep_pilot(qtbot, likert)
     qtbot.waitUntil(lambda: likert.place.header.version.chip_text == "Piloted")
     qtbot.mouseClick(likert.place.header.version, Qt.MouseButton.LeftButton)
     changes = likert.controller.changes
     assert changes.version.currentText().startswith("1.0: 1 pilot, last today")
     assert changes.note.text() == "The study is identical to this version."
     lines = lines_of(study)
-    (shown,) = sessions(likert.results, {})
+    (session,) = sessions(likert.results, {})
     played = datetime.fromisoformat(next(line["at"] for line in lines if line["event"] == "session_resumed"))
-    assert abs((shown.started - played).total_seconds()) < 1
+    assert abs((session.started - played).total_seconds()) < 1
     assert (played - datetime.fromisoformat(lines[0]["at"])).total_seconds() > 20  # of the steps that were skipped
     (known,) = likert.controller.runs.known
-    assert datetime.fromisoformat(known.last) == shown.started
+    assert datetime.fromisoformat(known.last) == session.started
     assert lines[0]["pilot"] is True
     assert lines[0]["simulated"] is True
     resumed = next(at for at, line in enumerate(lines) if line["event"] == "session_resumed")
@@ -177,9 +182,9 @@ def test_holding_escape_ends_at_zero_force_and_the_data_are_deleted(qtbot: Any, 
     assert not likert.place.header.strip.isVisible()
 
 
-def stop_of(participant: ParticipantWindow) -> CompactStop:
-    """Return the stop above the pages; nothing there leads to an operator's window."""
-    (stop,) = (one for one in participant.strip.findChildren(QAbstractButton) if one.isVisible())
+def stop_button_of(participant: ParticipantWindow) -> CompactStop:
+    """Return the stop button above the pages; check that it is the only button."""
+    (stop,) = (button for button in participant.strip.findChildren(QAbstractButton) if button.isVisible())
     assert isinstance(stop, CompactStop)
     assert stop.accessibleName() == "Stop playing. Holding Esc does the same."
     return stop
@@ -190,7 +195,7 @@ def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_
 ) -> None:
     pilots = likert.playing
     for leave in (
-        lambda: qtbot.mousePress(stop_of(window(ParticipantWindow)), Qt.MouseButton.LeftButton),
+        lambda: qtbot.mousePress(stop_button_of(window(ParticipantWindow)), Qt.MouseButton.LeftButton),
         lambda: window(ParticipantWindow).close(),
         lambda: pilots.pilot.session.bridge.fail(DeviceLost("the device is gone")),
         lambda: likert.window.go("home"),
@@ -271,11 +276,11 @@ def test_another_study_discards_the_data_of_a_pilot_that_has_ended(designer: Any
     assert (designer.playing.pilot, header.strip.notice, data.exists()) == (None, None, False)
 
 
-def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
+def test_another_device_needs_confirmation_and_a_later_fault_is_named(
     qtbot: Any, likert: Any, folders: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    header, opened = likert.place.header, []
-    monkeypatch.setattr(playing.PlayedSession, "open", lambda session: opened.append(session.chosen))
+    header, choices = likert.place.header, []
+    monkeypatch.setattr(playing.PlayedSession, "open", lambda session: choices.append(session.chosen))
     mouse = next(action for action in header.play.menu.actions() if action.text().startswith("Mouse"))
     mouse.trigger()
     press_f5(qtbot, likert)
@@ -288,8 +293,8 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     likert.open()
     press_f5(qtbot, likert)
     qtbot.keyClick(header.strip.buttons["play"], Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: bool(opened))
-    assert (opened[0].device, opened[0].pilot, opened[0].windowed) == ("mouse", True, True)
+    qtbot.waitUntil(lambda: bool(choices))
+    assert (choices[0].device, choices[0].pilot, choices[0].windowed) == ("mouse", True, True)
     likert.playing.pilot.session.over.emit()
     likert.editing.select(("pages", "thanks"))
     likert.place.pane.show_tab("file")
@@ -302,14 +307,14 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     )
     qtbot.mouseClick(header.strip.buttons["problems"], Qt.MouseButton.LeftButton)
     assert likert.place.problems.isVisible()
-    assert len(opened) == 1
+    assert len(choices) == 1
     assert not list(folders.iterdir())
 
 
 @pytest.mark.nightly
 def test_an_adaptive_study_is_played_from_its_tenth_trial(qtbot: Any, designer: Any, folders: Path) -> None:
     text = template("viscosity-jnd").text
-    limits = "".join(f"{one} = 1000\n" for one in UNLIMITED)
+    limits = "".join(f"{limit} = 1000\n" for limit in UNLIMITED)
     for old, new in (
         ("trials = 80", "trials = 12"),
         ("cycles = 3", "cycles = 1"),
@@ -330,7 +335,7 @@ def test_an_adaptive_study_is_played_from_its_tenth_trial(qtbot: Any, designer: 
     assert (trials[played[0]].block, trials[played[0]].index) == ("viscosity", 10)
     assert played[-1] == max(trials)
     assert not any(isinstance(page, FeedbackPage) for page in player.pages)
-    assert kept(qtbot, designer).name == "kitchen-pilot-1"
+    assert keep_pilot(qtbot, designer).name == "kitchen-pilot-1"
     assert not list(folders.iterdir())
 
 
@@ -350,7 +355,7 @@ def test_an_adaptive_study_is_played_from_its_tenth_trial(qtbot: Any, designer: 
         ({"has_begun": True, "status": None}, None, "stopped"),
     ],
 )
-def test_the_end_of_a_pilot_is_told(
+def test_the_end_of_a_pilot_is_reported(
     designer: Any, folders: Path, facts: dict[str, Any], said: tuple[str, str] | None, outcome: str | None
 ) -> None:
     designer.open()
@@ -367,7 +372,7 @@ def test_the_end_of_a_pilot_is_told(
     assert (notice and notice.text, data.exists()) == ((words, True) if outcome else (None, False))
 
 
-def test_a_pilot_that_cannot_be_prepared_or_kept_says_why(
+def test_a_pilot_that_fails_to_start_or_save_states_the_reason(
     qtbot: Any, designer: Any, folders: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(error: Exception) -> Any:
@@ -377,17 +382,19 @@ def test_a_pilot_that_cannot_be_prepared_or_kept_says_why(
         return fail
 
     designer.open()
-    pilots, told = designer.playing, designer.messages
+    pilots, messages = designer.playing, designer.messages
     with monkeypatch.context() as patch:
         patch.setattr(tempfile, "mkdtemp", refuse(OSError(28, "No space left on device")))
         pilots.play()
-    assert told == [("The study cannot be played", "A temporary folder cannot be created: No space left on device.")]
+    assert messages == [
+        ("The study cannot be played", "A temporary folder cannot be created: No space left on device.")
+    ]
     assert (pilots.is_under_way, pilots.pilot) == (False, None)
     with monkeypatch.context() as patch:
         patch.setattr(playing, "write_file", refuse(StoreError("the disk is full")))
         pilots.play()
         qtbot.waitUntil(lambda: not pilots.is_under_way)
-    assert told[1:] == [("The study cannot be played", "the disk is full.")]
+    assert messages[1:] == [("The study cannot be played", "the disk is full.")]
     assert (list(folders.iterdir()), designer.place.header.strip.notice) == ([], None)
     study = SimpleNamespace(study=SimpleNamespace(name="kitchen"))
     (folders / "pilot" / "results").mkdir(parents=True)
@@ -398,7 +405,7 @@ def test_a_pilot_that_cannot_be_prepared_or_kept_says_why(
     with monkeypatch.context() as patch:
         patch.setattr(playing, "copy_folder", refuse(StoreError("the disk is full")))
         designer.place.header.strip.asked.emit("keep")
-    assert told[2:] == [("The pilot was not saved", "the disk is full.")]
+    assert messages[2:] == [("The pilot was not saved", "the disk is full.")]
     assert (folders / "pilot" / "results").exists()
     with qtbot.waitSignal(pilots.kept) as kept_in:
         designer.place.header.strip.asked.emit("keep")

@@ -22,7 +22,7 @@ NONE, LEFT = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.LeftButton
 
 
 def no_worker() -> None:
-    """Refuse to start the worker of simulations: tests that need it give another one."""
+    """Refuse to start the simulation worker; tests that need one set another."""
     raise OSError("no process in this test")
 
 
@@ -81,23 +81,23 @@ class Designer(KeyUser):
 
     @property
     def text(self) -> str:
-        """The text of the open study."""
+        """Return the text of the open study."""
         assert self.editing.opened is not None
         return self.editing.opened.study.text
 
     @property
     def study(self) -> Any:
-        """The open study."""
+        """Return the open study."""
         assert self.editing.opened is not None
         return self.editing.opened.study
 
     def value(self, *path: str | int) -> Any:
-        """The value at a place of the open study."""
+        """Return the value at a path of the open study."""
         return value_at(self.study.document, path)
 
     @property
     def steps(self) -> list[str]:
-        """What was done, in words."""
+        """Return the titles of the steps."""
         assert self.editing.opened is not None
         return [step.title for step in self.editing.opened.done]
 
@@ -108,20 +108,20 @@ class Designer(KeyUser):
         return self.text
 
     def form_row(self, *path: str | int) -> Any:
-        """The form's row of a place."""
+        """Return the form's row of a path."""
         return next(row for row in self.place.form.rows if row.row.path == path)
 
     def field(self, *path: str | int) -> Any:
-        """The field of a place in the form."""
+        """Return the form's field of a path."""
         return self.form_row(*path).field
 
     @property
     def keyboard(self) -> Any:
-        """The part that has the keyboard."""
+        """Return the focused widget."""
         return QApplication.focusWidget()
 
     def hit(self, keys: str, times: int = 1) -> Any:
-        """Press keys where the keyboard is; return the part that has it then."""
+        """Press keys on the focused widget; return the widget that has the focus then."""
         self.key(keys, times)
         QApplication.processEvents()
         return self.keyboard
@@ -139,5 +139,5 @@ class Designer(KeyUser):
         QTest.mouseClick(part, LEFT, HELD[held] if held else NONE, part.rect().center() if at is None else at)
 
     def index(self, *path: str | int) -> Any:
-        """The index of an element's first row in the outline."""
-        return next(one for one in self.outline.indexes() if one.data(ROW_ROLE).path == path)
+        """Return the index of an element's first row in the outline."""
+        return next(index for index in self.outline.indexes() if index.data(ROW_ROLE).path == path)

@@ -18,23 +18,23 @@ HELD = {
 }
 
 
-def happens(found: Callable[[], object], ms: int) -> bool:
-    """Handle events until something is so; return whether it is within a time."""
+def happens(condition: Callable[[], object], ms: int) -> bool:
+    """Handle events until a condition holds; return whether it does within a time."""
     ends = time.perf_counter() + ms / 1000
-    while not found():
+    while not condition():
         if time.perf_counter() > ends:
             return False
         QTest.qWait(5)
     return True
 
 
-def wait_until(found: Callable[[], object], what: str, ms: int = PATIENCE_MS) -> None:
-    """Handle events until something is so."""
-    assert happens(found, ms), f"waited {ms / 1000:g} s in vain for {what}"
+def wait_until(condition: Callable[[], object], what: str, ms: int = PATIENCE_MS) -> None:
+    """Handle events until a condition holds; fail after a time."""
+    assert happens(condition, ms), f"waited {ms / 1000:g} s in vain for {what}"
 
 
 def name_of(part: QWidget) -> str:
-    """Return what a screen reader calls a part."""
+    """Return the accessible name of a widget."""
     return part.accessibleName() or (part.text() if isinstance(part, QAbstractButton) else "")
 
 
@@ -44,7 +44,7 @@ def window_in_front() -> QWidget | None:
 
 
 class Hand(Protocol):
-    """What sends keys and texts to the part that has the keyboard, clicks and notches of the wheel to a place.
+    """The source of input: keys and texts for the focused widget, clicks and wheel notches at a position.
 
     ``aims_ms`` is how long a part must stay where it is before it is clicked.
     """
@@ -69,10 +69,10 @@ class QtInput:
 
     def key(self, keys: str) -> None:
         """Press keys, as "ctrl+s" or "shift+Tab"."""
-        *held, name = keys.split("+")
+        *modifier_names, name = keys.split("+")
         modifiers = Qt.KeyboardModifier.NoModifier
-        for one in held:
-            modifiers |= HELD[one]
+        for modifier in modifier_names:
+            modifiers |= HELD[modifier]
         QTest.keyClick(self._takes_keys(), Qt.Key[f"Key_{name[:1].upper()}{name[1:]}"], modifiers)
 
     def write(self, text: str) -> None:
@@ -135,11 +135,11 @@ class XInput:
 
     def _focus(self) -> None:
         """Give the keyboard to the window in front, as a window manager would."""
-        shown = QApplication.activeModalWidget() or QApplication.activeWindow()
-        if shown is None:
-            shown = next((one for one in reversed(QApplication.topLevelWidgets()) if one.isVisible()), None)
-            if shown is not None:
-                self.bring_forward(shown)
+        front = QApplication.activeModalWidget() or QApplication.activeWindow()
+        if front is None:
+            front = next((widget for widget in reversed(QApplication.topLevelWidgets()) if widget.isVisible()), None)
+            if front is not None:
+                self.bring_forward(front)
 
     def bring_forward(self, window: QWidget) -> None:
         """Give the keyboard to a window, and put it above the others, as a window manager would."""

@@ -20,7 +20,7 @@ PLAYED_S = 400.0
 
 def begin(user: User, template: str, title: str) -> None:
     """Begin a study from a template, at the home window."""
-    user.press("New study …*")
+    user.press("New study…*")
     user.press(f"Template {template}")
     user.write("Title", title, accept=False)
     user.shortcut("Return", "Make study")
@@ -131,23 +131,23 @@ STUDIES = {"twoliquids": make_likert, "whichwaslate": make_two_interval}
 
 def check_likert(study: Study) -> None:
     """Check the study of two liquids."""
-    found = study.document
-    assert found["blocks"]["liquids"]["conditions"] == ("water", "honey")
-    assert found["conditions"]["honey"]["liquid"] == "honey"
-    assert found["liquids"]["honey"] == {"density_kg_m3": 1400, "viscosity_pa_s": 5, "effects": ("drag",)}
-    questionnaire = found["questionnaires"][found["blocks"]["liquids"]["questionnaire"]]
+    document = study.document
+    assert document["blocks"]["liquids"]["conditions"] == ("water", "honey")
+    assert document["conditions"]["honey"]["liquid"] == "honey"
+    assert document["liquids"]["honey"] == {"density_kg_m3": 1400, "viscosity_pa_s": 5, "effects": ("drag",)}
+    questionnaire = document["questionnaires"][document["blocks"]["liquids"]["questionnaire"]]
     assert [item["text"] for item in questionnaire["items"]] == ["This feels like a liquid.", "This is thick."]
-    labels = found["scales"][questionnaire["scale"]]["labels"]["en"]
+    labels = document["scales"][questionnaire["scale"]]["labels"]["en"]
     assert (labels[0], labels[6], len(labels)) == ("Not at all", "Very much", 7)
 
 
 def check_two_interval(study: Study) -> None:
     """Check the study of delays."""
-    found = study.document
-    block = found["blocks"]["liquids"]
+    document = study.document
+    block = document["blocks"]["liquids"]
     assert "conditions" not in block
     stimulus, design, method = (
-        found[section][block[key]]
+        document[section][block[key]]
         for section, key in (("stimuli", "stimulus"), ("designs", "design"), ("methods", "method"))
     )
     assert stimulus == {"vary": "delay_ms", "levels": (50, 200)}
@@ -159,8 +159,8 @@ CHECKS: dict[str, Callable[[Study], None]] = {"twoliquids": check_likert, "which
 
 
 def check_file(file: Path, study: str) -> None:
-    """Check that the file holds the study as it was meant."""
-    made = read_study(file.read_bytes(), file.parent)
-    assert made.faults == ()
-    assert made.document["tasks"]["explore"]["max_s"] == 2
-    CHECKS[study](made)
+    """Check that the file contains the intended study."""
+    read = read_study(file.read_bytes(), file.parent)
+    assert read.faults == ()
+    assert read.document["tasks"]["explore"]["max_s"] == 2
+    CHECKS[study](read)

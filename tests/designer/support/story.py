@@ -25,14 +25,14 @@ ACT = re.compile(r"'(?P<typed>[^']*)'|\[(?P<pressed>[^]]*)\]|@(?P<selected>\S+)|
 
 
 def settle(designer: Any) -> None:
-    """Let all be done now that a timer would do later, or a job in the background."""
+    """Run all pending timers and background jobs now."""
     quiet = 0
     while quiet < 2:
         wait_for_jobs(60)
         QApplication.processEvents()
         designer.saving.write_draft()
-        found = (*designer.controller.findChildren(QTimer), *designer.window.findChildren(QTimer))
-        single = [timer for timer in found if timer.isSingleShot()]
+        timers = (*designer.controller.findChildren(QTimer), *designer.window.findChildren(QTimer))
+        single = [timer for timer in timers if timer.isSingleShot()]
         due = [timer for timer in single if timer.isActive()]
         for timer in single:
             timer.setInterval(NEVER_MS)  # else a slow machine changes the order
@@ -43,7 +43,7 @@ def settle(designer: Any) -> None:
 
 
 class Story:
-    """A designer, what it said since that was asked, and the lines of its window where they are recorded."""
+    """A designer with its messages since the last check, and optionally the recorded lines of its window."""
 
     def __init__(self, designer: Any, spoken: list[str], text: str = DEMO) -> None:
         self.designer, self.spoken, self.text = designer, spoken, text
@@ -70,7 +70,7 @@ class Story:
                     self.act(f"key {keys}", lambda keys=keys: self.designer.key(keys))
 
     def act(self, name: str, act: Callable[[], Any]) -> None:
-        """Do something, and check that all parts of the window agree afterwards; note what it tells, if asked to."""
+        """Run an act, and check that all parts of the window agree afterwards; record its lines if enabled."""
         if QApplication.activePopupWidget() is None and not self.designer.window.isActiveWindow():
             self.designer.window.activateWindow()
             QApplication.processEvents()
@@ -84,17 +84,17 @@ class Story:
         except AssertionError as disagreement:
             raise AssertionError(f"after {name!r}: {disagreement}") from disagreement
         if self.lines is not None:
-            shown = QApplication.activePopupWidget() or self.designer.window
-            after = [line for line in spoken(shown) if not line.startswith("ScrollBar")]
+            front = QApplication.activePopupWidget() or self.designer.window
+            after = [line for line in spoken(front) if not line.startswith("ScrollBar")]
             self.lines += [f"-- {name}", *comes_and_goes(self._before, after)]
             self._before = after
 
     def check(self) -> None:
         """Check that header, form, draft and keyboard agree with the text of the study."""
-        designer, opened = self.designer, self.designer.editing.opened
+        designer, document = self.designer, self.designer.editing.opened
         focus = QApplication.focusWidget()
         assert focus is None or focus.isVisible(), f"the keyboard is at {name_of(focus)!r}, which is hidden"
-        if opened is None:
+        if document is None:
             return
         header, form, prompt = designer.place.header, designer.place.form, designer.place.prompt
         if prompt is not None and prompt.isVisible():
@@ -102,37 +102,37 @@ class Story:
             assert (prompt.accessibleName(), heading.endswith((".", ":"))) == (heading, False), heading
             explanations = [part.text() for part in prompt.findChildren(QLabel) if part.text() != heading]
             assert explanations[0].endswith((".", ":")), explanations
-        if opened.study.text != self._checked:
-            self._checked = opened.study.text
-            again = read_study(self._checked.encode(), opened.file.parent)
-            assert again.faults == opened.study.faults
+        if document.study.text != self._checked:
+            self._checked = document.study.text
+            again = read_study(self._checked.encode(), document.file.parent)
+            assert again.faults == document.study.faults
             rows = [row.fault for row in designer.place.view.problems if not row.warning]
-            unfinished = again.with_unfinished(opened.study.unfinished)
+            unfinished = again.with_unfinished(document.study.unfinished)
             assert rows == [row.fault for row in problem_rows(unfinished)], "the list of problems"
-        count = len(problem_rows(opened.study))
+        count = len(problem_rows(document.study))
         words = header.problems.chip_text
         assert words == problems_chip(count, 0)[2] if count else not words.endswith("problem"), words
-        for button, steps in ((header.undo, opened.done), (header.redo, opened.undone)):
-            assert button.isEnabled() == (bool(steps) and not opened.read_only), button.accessibleName()
+        for button, steps in ((header.undo, document.done), (header.redo, document.undone)):
+            assert button.isEnabled() == (bool(steps) and not document.read_only), button.accessibleName()
             assert not steps or button.accessibleName().endswith(steps[-1].title), button.accessibleName()
-        assert form.head.path == opened.selected[: len(form.head.path)], (form.head.path, opened.selected)
+        assert form.head.path == document.selected[: len(form.head.path)], (form.head.path, document.selected)
         for row in form.rows:
-            assert row.row.value == value_at(opened.study.document, row.row.path), row.row.path
-        draft, text = draft_of(opened.file), opened.study.text
+            assert row.row.value == value_at(document.study.document, row.row.path), row.row.path
+        draft, text = draft_of(document.file), document.study.text
         if self.drafts_are_kept:
             kept = None if draft is None else draft.text
             assert kept == (None if self.kept == "saved" else text), f"the draft of a study that is {self.kept}"
 
     @property
     def kept(self) -> str:
-        """Whether the text is that of the file: "saved", "edited", or "not saved" where there is no file."""
+        """Return "saved" if the text is that of the file, otherwise "edited", or "not saved" without a file."""
         file, text = self.designer.editing.opened.file, self.designer.text
         if not file.exists():
             return "not saved"
         return "saved" if file.read_bytes().decode(errors="replace") == text else "edited"
 
     def expect(self, *said: str, selected: str = "", undo: str | None = None, kept: str = "", at: str = "") -> None:
-        """Check what was said since this was asked last, what is selected, undone, kept, and has the keyboard."""
+        """Check the messages since the last call, the selection, undo, the saved state and the focus."""
         heard = [TIME.sub("HH:MM", words) for words in self.spoken]
         self.spoken.clear()
         for words in said:
@@ -157,23 +157,23 @@ class Story:
             assert text not in self.designer.text, text
 
     def undo_and_redo(self) -> None:
-        """Undo all steps, then redo them: each gives the text before and after it back."""
-        opened = self.designer.editing.opened
-        if opened is None or opened.read_only:
+        """Undo all steps, then redo them: each restores the text before or after it."""
+        document = self.designer.editing.opened
+        if document is None or document.read_only:
             return
-        texts = [opened.study.text]
-        for _ in tuple(opened.done):
+        texts = [document.study.text]
+        for _ in tuple(document.done):
             self.designer.editing.undo()
-            texts.append(opened.study.text)
+            texts.append(document.study.text)
         for text in texts[-2::-1]:
             self.designer.editing.redo()
-            assert opened.study.text == text
+            assert document.study.text == text
 
     def press(self, name: str) -> None:
         """Press a button by the mouse."""
-        found = self.designer.parts(name, QAbstractButton)
-        assert found, (name, [name_of(one) for one in self.designer.parts("*", QAbstractButton)])
-        self.act(f"press {name}", lambda: self.designer.click_on(found[0]))
+        buttons = self.designer.parts(name, QAbstractButton)
+        assert buttons, (name, [name_of(button) for button in self.designer.parts("*", QAbstractButton)])
+        self.act(f"press {name}", lambda: self.designer.click_on(buttons[0]))
 
     def press_row(self, *path: str | int, held: str = "") -> None:
         """Press an element's first row in the outline by the mouse."""

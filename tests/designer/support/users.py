@@ -33,11 +33,11 @@ AREAS = (("Header", "ctrl+5"), ("Outline", "ctrl+1"), ("Form", "ctrl+2"), ("Stud
 
 
 def place_of(box: QComboBox, words: str) -> int:
-    """Return which entry of a list has some words; those in brackets behind may be left out."""
+    """Return the position of the entry with a text; a suffix in brackets may be omitted."""
     entries = [box.itemText(at) for at in range(box.count())]
-    found = [at for at, entry in enumerate(entries) if entry == words or entry.startswith(f"{words} (")]
-    assert found, f"{words!r} is not among {entries}"
-    return found[0]
+    positions = [at for at, entry in enumerate(entries) if entry == words or entry.startswith(f"{words} (")]
+    assert positions, f"{words!r} is not among {entries}"
+    return positions[0]
 
 
 def are_segments(part: QObject | None) -> bool:
@@ -53,45 +53,45 @@ def _of_a_group(focused: QWidget, part: QWidget) -> bool:
 
 
 class User:
-    """What users share; ``actions`` counts what was done."""
+    """The base class of users; ``actions`` counts their actions."""
 
     def __init__(self, window: QWidget, hand: Hand) -> None:
         self.window, self.hand = window, hand
         self.actions = 0
 
     def parts(self, name: str, *kinds: type[QWidget]) -> list[QWidget]:
-        """Return the parts of some kinds in the window in front that are shown under a name; it may end in "*"."""
+        """Return the visible widgets of some kinds in the front window with a name, which may end in "*"."""
         inside = window_in_front() or self.window
-        found = []
+        parts = []
         for part in inside.findChildren(QWidget):
             called = name_of(part)
             fits = called.startswith(name[:-1]) if name.endswith("*") else called == name
             if fits and isinstance(part, kinds or QWidget) and part.isVisible() and part.isEnabled():
-                found.append(part)
-        return found
+                parts.append(part)
+        return parts
 
     def part(self, name: str, *kinds: type[QWidget]) -> QWidget:
-        """Return the part of a name; wait for it. One of the form comes before others."""
+        """Wait for the widget with a name and return it, preferring those of the form."""
         what = f"a part called {name!r}"
         wait_until(lambda: self.parts(name, *kinds), what)  # the designer may still be loading
         form = self.area("Form")
         return min(self.parts(name, *kinds), key=lambda part: form is None or not form.isAncestorOf(part))
 
     def sees(self, name: str) -> bool:
-        """Return whether a part of a name is shown."""
+        """Return whether a widget with a name is shown."""
         return bool(self.parts(name))
 
     def area(self, name: str) -> Any:
-        """Return the part of the designer's window of a name; None before it is loaded."""
-        return next((one for one in self.window.findChildren(QWidget) if one.accessibleName() == name), None)
+        """Return the widget of the designer's window with a name, or None before it is loaded."""
+        return next((widget for widget in self.window.findChildren(QWidget) if widget.accessibleName() == name), None)
 
     @property
     def outline(self) -> Any:
-        """The outline."""
+        """Return the outline."""
         return self.area("Outline")
 
     def row(self, title: str, section: str = "") -> QModelIndex:
-        """Return the row of the outline with a title, below another one or its heading where one is given."""
+        """Return the row of the outline with a title, optionally below another row or heading."""
 
         def look() -> QModelIndex | None:
             heading = ""
@@ -104,9 +104,9 @@ class User:
             return None
 
         wait_until(look, f"{title!r} in the outline", 5000)
-        found = look()
-        assert found is not None
-        return found
+        index = look()
+        assert index is not None
+        return index
 
     def key(self, keys: str, times: int = 1) -> None:
         """Press keys."""
@@ -136,23 +136,23 @@ class User:
         raise NotImplementedError
 
     def add(self, words: str) -> None:
-        """Add what the list of additions calls so."""
+        """Add the element with this name in the list of additions."""
         raise NotImplementedError
 
     def shortcut(self, keys: str, button: str) -> None:
-        """Do what has a key and a button."""
+        """Run a command that has both a key and a button."""
         raise NotImplementedError
 
     def answer(self, window: ParticipantWindow) -> None:
-        """Answer the page of a participant, each question with its third answer; or go on from it."""
+        """Answer each question of a participant's page with its third answer, or continue."""
         raise NotImplementedError
 
 
 class KeyUser(User):
-    """Uses keys alone."""
+    """A user who uses only keys."""
 
     def reach(self, part: QWidget) -> None:
-        """Go to a part: to its area by Ctrl and a digit, then by Tab."""
+        """Move the focus to a widget: to its area by Ctrl and a digit, then by Tab."""
         focused = self._focused()
         if focused is not None and self._is_at(part, focused):
             return
@@ -160,7 +160,7 @@ class KeyUser(User):
             area = self.area(name)
             if area is not None and area.isAncestorOf(part) and not (focused and area.isAncestorOf(focused)):
                 self.key(keys, 2 if part.accessibleName() == VIEWS else 1)
-        seen: list[str] = []
+        names: list[str] = []
         keys = self._leads(self._focused(), part)
         for _ in range(MOST_TABS):
             focused = self._focused()
@@ -169,9 +169,9 @@ class KeyUser(User):
             if focused is not None and _of_a_group(focused, part):
                 self._go_within_group(part)
                 return
-            seen.append("" if focused is None else name_of(focused))
+            names.append("" if focused is None else name_of(focused))
             self.key(keys)
-        raise AssertionError(f"{name_of(part)!r} is not reached by Tab, which goes through {seen[-30:]}")
+        raise AssertionError(f"{name_of(part)!r} is not reached by Tab, which goes through {names[-30:]}")
 
     @staticmethod
     def _focused() -> QWidget | None:
@@ -184,7 +184,7 @@ class KeyUser(User):
 
     @staticmethod
     def _leads(focused: QWidget | None, part: QWidget) -> str:
-        """Return the key that leads to a part: in a column Tab goes down, between columns to the right."""
+        """Return the key that leads to a widget: Tab goes down columns, then to the right."""
         # `QWidget.nextInFocusChain` would tell, but its wrappers own each other: they take parts of the program along
         if focused is None:
             return "Tab"
@@ -291,7 +291,7 @@ class KeyUser(User):
 
 
 class MouseUser(User):
-    """Uses the mouse alone; texts and numbers are typed into fields that were clicked."""
+    """A user who uses only the mouse, and types texts and numbers into clicked fields."""
 
     def click(self, part: QWidget, times: int = 1) -> None:
         """Click a part, after the wheel has brought it into view."""
@@ -300,7 +300,7 @@ class MouseUser(User):
         self.click_at(part.mapToGlobal(inside.center()), times)
 
     def _aim(self, part: QWidget) -> None:
-        """Wait until a part stays where it is: what was done before may still move it."""
+        """Wait until a widget stops moving after earlier actions."""
         before, still_ms = None, 0
         while still_ms < self.hand.aims_ms:
             here = part.mapToGlobal(QPoint(0, 0)), part.size()
@@ -314,15 +314,15 @@ class MouseUser(User):
         self.hand.click(at, times)
 
     def _bring_into_view(self, part: QWidget) -> QRect:
-        """Turn the wheel until a part is seen; return what is seen of it."""
+        """Turn the wheel until a widget is visible; return its visible rectangle."""
         area: QScrollArea | None = None
         above = part.parentWidget()
         while above is not None and area is None:
             area = above if isinstance(above, QScrollArea) else None
             above = above.parentWidget()
         for _ in range(60):
-            seen = part.visibleRegion().boundingRect()
-            if area is None or seen.height() >= min(24, part.height()):
+            visible = part.visibleRegion().boundingRect()
+            if area is None or visible.height() >= min(24, part.height()):
                 break
             view = area.viewport()
             below = part.mapTo(view, QPoint(0, 0)).y() > 0
@@ -331,9 +331,9 @@ class MouseUser(User):
             self.actions += 1
             self.hand.turn_wheel(view.mapToGlobal(QPoint(4, view.height() // 2)), below)  # where no field takes it
             assert bar.value() != before, f"the wheel does not bring {name_of(part)!r} into view"
-        seen = part.visibleRegion().boundingRect()
-        assert not seen.isEmpty(), f"{name_of(part)!r} cannot be seen"
-        return seen
+        visible = part.visibleRegion().boundingRect()
+        assert not visible.isEmpty(), f"{name_of(part)!r} cannot be seen"
+        return visible
 
     def press(self, name: str) -> None:
         self.click(self.part(name, QAbstractButton))
@@ -391,11 +391,11 @@ class MouseUser(User):
         self.press(button)
 
     def answer(self, window: ParticipantWindow) -> None:
-        shown: Any = window.widget
+        page_widget: Any = window.widget
         if isinstance(window.page, QuestionnairePage):
-            for field in shown.fields:
+            for field in page_widget.fields:
                 self.click(field.options[2])
-        self.click(shown.buttons[0] if isinstance(window.page, ChoicePage) else shown.button)
+        self.click(page_widget.buttons[0] if isinstance(window.page, ChoicePage) else page_widget.button)
 
 
 USERS: dict[str, type[User]] = {"keys": KeyUser, "mouse": MouseUser}

@@ -18,17 +18,17 @@ from study_app.errors import DeviceError
 
 
 class Recorder:
-    """A bridge that takes everything and keeps what was sent."""
+    """A bridge that accepts and records all packets."""
 
     def __init__(self) -> None:
         self.sent = list[bytes]()
         self.controls = list[tuple[int, int]]()
 
     def note_claim(self) -> None:
-        """Let a program have it."""
+        """Record that a program has claimed the bridge."""
 
     def pause(self, _seconds: float) -> None:
-        """Let no time pass."""
+        """Do not wait."""
 
     def control(self, request: int, value: int) -> int:
         self.controls.append((request, value))
@@ -75,8 +75,8 @@ class Server(threading.Thread):
                 try:
                     while True:
                         name, *arguments = connection.recv()
-                        found = getattr(self.bridge, name)
-                        connection.send(found(*arguments) if callable(found) else found)
+                        attribute = getattr(self.bridge, name)
+                        connection.send(attribute(*arguments) if callable(attribute) else attribute)
                 except (EOFError, OSError):
                     pass
 
@@ -162,7 +162,7 @@ def _check(code: int, where: str) -> None:
 
 
 def end_torque(path: str) -> None:
-    """Do what the Falcon's guard does."""
+    """End the torque as the Falcon's guard does."""
     transport = ServedTransport(path)
     try:
         if not send_zero_torque(transport):

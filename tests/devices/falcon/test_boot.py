@@ -1,4 +1,4 @@
-"""Loading the Falcon's program: what is said, how often it is tried and what the bridge is asked, as reviewed texts."""
+"""Loading the Falcon's firmware: messages, attempts and requests to the bridge, as reviewed texts."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -47,10 +47,10 @@ class Wrong(PyUsbTransport):
     bauds: tuple[tuple[int, int], ...] = ()
     fails: Any = None
     spoils = ends = -1
-    opened = sent = pieces = 0
+    reopen_count = sent = pieces = 0
 
     def reopen(self) -> None:
-        self.opened += 1
+        self.reopen_count += 1
         super().reopen()
 
     def control(self, request: int, value: int) -> None:
@@ -124,12 +124,15 @@ CASES: dict[str, tuple[Callable[[Emulator, Wrong], None], int, bytes]] = {
         f"{count} pings are ignored": (partial(ignored, count), 1, stream())
         for count in (1, 3, PINGS - 1)
     },
-    **{f"{one}, {other}": (faulty(one, other), 1, stream()) for one in SEEN for other in SEEN[:3]},
+    **{f"{first}, {second}": (faulty(first, second), 1, stream()) for first in SEEN for second in SEEN[:3]},
     "replies wait": (replies_wait, 1, stream()),
     "no mains adapter": (unpowered, 10, stream()),
-    **{f"speed {taken:#x} is {given_:#x}": (bridge(bauds=((taken, given_),)), 2, stream()) for taken, given_ in SPEEDS},
+    **{
+        f"speed {requested:#x} is {actual:#x}": (bridge(bauds=((requested, actual),)), 2, stream())
+        for requested, actual in SPEEDS
+    },
     **{f"echo of byte {at}": (bridge(spoils=at), 1, stream()) for at in (0, 1, 61, 62, 500)},
-    "echo spoilt once": (lambda emulator, _: emulator.faults.once("echo"), 10, stream()),
+    "echo spoilt once": (lambda emulator, _: emulator.faults.schedule("echo"), 10, stream()),
     "echo ends": (bridge(ends=3), 1, stream()),
     "says nothing": (lambda emulator, _: emulator.faults.chance("drop", 1.0), 1, stream()),
     "gone": (bridge(fails=usb_failure(constants.ERROR_NO_DEVICE, "sending")), 10, stream()),
@@ -138,24 +141,26 @@ CASES: dict[str, tuple[Callable[[Emulator, Wrong], None], int, bytes]] = {
 
 
 def test_loading_the_program(pytestconfig: pytest.Config) -> None:
-    told = list[str]()
+    lines = list[str]()
     for name, (happens, attempts, data) in CASES.items():
         emulator, transport = falcon(running=happens is replies_wait)
         happens(emulator, transport)
         emulator.recorded.clear()
-        transport.opened = 0
-        told.append(f"== {name}")
+        transport.reopen_count = 0
+        lines.append(f"== {name}")
         try:
-            told.append(f"loaded {boot_falcon(transport, data, progress=told.append, attempts=attempts).size} bytes")
+            lines.append(f"loaded {boot_falcon(transport, data, progress=lines.append, attempts=attempts).size} bytes")
         except DeviceError as failure:
-            told.append(f"{type(failure).__name__} {getattr(failure, 'step', '')}: {failure}")
-        asked = " ".join(f"{request}:{value:#x}" for request, value in emulator.recorded[:40])
-        told.append(f"{emulator.loaded} loaded, running {emulator.running}, opened {transport.opened}: {asked}")
-    compare(GOLDEN / "boot.txt", told, pytestconfig)
+            lines.append(f"{type(failure).__name__} {getattr(failure, 'step', '')}: {failure}")
+        requests = " ".join(f"{request}:{value:#x}" for request, value in emulator.recorded[:40])
+        lines.append(
+            f"{emulator.loaded} loaded, running {emulator.running}, opened {transport.reopen_count}: {requests}"
+        )
+    compare(GOLDEN / "boot.txt", lines, pytestconfig)
 
 
 @pytest.mark.parametrize(("fault", "kind"), [("busy", "busy"), ("unplugged", "not-found")])
-def test_a_bridge_that_is_taken_or_gone_between_attempts_ends_them(fault: str, kind: str) -> None:
+def test_a_busy_or_missing_bridge_ends_the_attempts(fault: str, kind: str) -> None:
     emulator, transport = falcon()
     emulator.power(False)
     with pytest.raises(DeviceError) as caught:
@@ -176,8 +181,8 @@ def test_a_program_that_is_loaded_again_keeps_nothing_of_the_earlier_one(*, swit
     """The earlier program hangs for a minute in the middle of a packet and of the hand's motion."""
     emulator, transport = falcon(running=True)
     configure(transport)
-    emulator.faults.last(stall_s=60.0)
-    emulator.faults.once("stall")
+    emulator.faults.set_durations(stall_s=60.0)
+    emulator.faults.schedule("stall")
     transport.write(constants.quiet_packet(), 0.1)
     transport.pause(0.01)
     assert not is_running(transport)
@@ -274,17 +279,17 @@ STREAMS = {
 }
 
 
-def test_what_a_file_of_firmware_is_said_to_be(pytestconfig: pytest.Config) -> None:
-    told = list[str]()
+def test_firmware_files_are_described(pytestconfig: pytest.Config) -> None:
+    lines = list[str]()
     for name, data in STREAMS.items():
         try:
-            found = check_firmware(data)
+            firmware = check_firmware(data)
         except DeviceError as failure:
-            told.append(f"{name}: {failure}")
+            lines.append(f"{name}: {failure}")
         else:
-            told.append(f"{name}: {found.name} {found.size} {found.entry:#x} {found.blocks}")
-    assert len(told) == len("\n".join(told).splitlines())
-    compare(GOLDEN / "firmware.txt", told, pytestconfig, exact=True)
+            lines.append(f"{name}: {firmware.name} {firmware.size} {firmware.entry:#x} {firmware.blocks}")
+    assert len(lines) == len("\n".join(lines).splitlines())
+    compare(GOLDEN / "firmware.txt", lines, pytestconfig, exact=True)
     published = "1119e39c39fab1f37678ea62dfc715b23dd86ee7f13d78f88f707d9f09b896a1"
     assert KNOWN[published[:16], published[-8:]] == "nvent_firmware.bin"
 
@@ -295,9 +300,9 @@ def test_no_bytes_make_it_fail_otherwise(data: bytes, at: int, byte: int) -> Non
     spoilt[at] = byte
     for candidate in (data, stream()[:22] + data, words(0x08AA) + data, bytes(spoilt)):
         try:
-            found = check_firmware(candidate)
+            firmware = check_firmware(candidate)
         except DeviceError:
             continue
-        assert found.size == len(candidate)
-        assert (found.sha256 == check_firmware(stream()).sha256) == (candidate == stream())
-        assert sum(2 * block.words + 6 for block in found.blocks) == len(candidate) - 24
+        assert firmware.size == len(candidate)
+        assert (firmware.sha256 == check_firmware(stream()).sha256) == (candidate == stream())
+        assert sum(2 * block.words + 6 for block in firmware.blocks) == len(candidate) - 24

@@ -1,4 +1,4 @@
-"""How late replies are, measured while it runs: a slower link is seen soon, a lost reply is not taken for one."""
+"""The delay of replies, measured during operation: a slower link is detected soon, a lost reply is ignored."""
 
 from random import Random
 
@@ -30,8 +30,8 @@ class Link(Ticks):
         self.open_gate()
 
     def run(self, ticks, delay, swinging_n=0.0):
-        """Return the delay reported at each of so many reads, -1 where there was nothing new."""
-        told = []
+        """Return the reported delay at each of this number of reads, or -1 without a new sample."""
+        delays = []
         for _ in range(ticks):
             now = self.now_ns // 10**6
             before = len(self.bridge.sent)
@@ -40,43 +40,43 @@ class Link(Ticks):
             self.reading[0].delay_ticks = -1
             force_n = swinging_n * np.array([1.0, 0.0, 0.0]) * (1 + now % 2)
             answer, _ = self.tick(*came[:3], force_n=tuple(force_n))
-            told.append(int(self.reading[0].delay_ticks) if answer == READ_NEW else -1)
+            delays.append(int(self.reading[0].delay_ticks) if answer == READ_NEW else -1)
             if len(self.bridge.sent) > before and self._random.random() >= self._lost:
                 self._due += [now + delay] * (1 + (self._random.random() < self._twice))
-        return told
+        return delays
 
 
 @pytest.mark.parametrize("delay", [2, 3, 4])
 def test_a_link_that_becomes_slower_is_seen_within_some_tens_of_ticks(delay):
     link = Link()
     assert set(link.run(200, 1)[100:]) == {1}
-    told = link.run(100, delay)
-    first = told.index(delay)
+    delays = link.run(100, delay)
+    first = delays.index(delay)
     assert first <= SLOWER_READS + 3 * delay + 2
-    assert set(told[first:]) == {delay}
+    assert set(delays[first:]) == {delay}
 
 
 def test_a_link_that_becomes_slower_is_seen_while_the_force_changes_too_fast_for_a_measurement():
     link = Link()
     link.run(200, 1)
-    told = link.run(100, 3, swinging_n=3.0)
-    assert told.index(3) <= GIVEN_UP_READS + 5
-    assert told.count(-1) < 10
+    delays = link.run(100, 3, swinging_n=3.0)
+    assert delays.index(3) <= GIVEN_UP_READS + 5
+    assert delays.count(-1) < 10
 
 
 def test_a_link_that_becomes_quicker_again_is_seen():
     link = Link()
     link.run(200, 3)
-    told = link.run(2 * FASTER_READS, 1)
-    assert told.index(1) <= FASTER_READS + RETEST_TICKS
-    assert set(told[told.index(1) :]) <= {1, -1}
+    delays = link.run(2 * FASTER_READS, 1)
+    assert delays.index(1) <= FASTER_READS + RETEST_TICKS
+    assert set(delays[delays.index(1) :]) <= {1, -1}
 
 
 def test_a_link_slower_than_any_stable_loop_gives_no_positions_until_it_recovers():
     link = Link()
     link.run(200, 1)
-    told = link.run(200, 6)
-    assert set(told[40:]) == {-1}
+    delays = link.run(200, 6)
+    assert set(delays[40:]) == {-1}
     assert set(link.run(200, 2)[-20:]) == {2}
 
 
@@ -85,10 +85,10 @@ def test_a_link_slower_than_any_stable_loop_gives_no_positions_until_it_recovers
     "delay", [pytest.param(1, marks=pytest.mark.nightly), 2, pytest.param(3, marks=pytest.mark.nightly)]
 )
 @pytest.mark.parametrize(("lost", "twice"), [(0.02, 0.0), (0.1, 0.0), (0.0, 0.05), (0.03, 0.03)])
-def test_lost_and_doubled_replies_are_told_from_late_ones(delay, lost, twice):
+def test_lost_and_doubled_replies_are_distinguished_from_late_ones(delay, lost, twice):
     link = Link(lost, twice)
-    told = np.array(link.run(4000, delay)[100:])
-    fresh = told[told > 0]
+    delays = np.array(link.run(4000, delay)[100:])
+    fresh = delays[delays > 0]
     assert len(fresh) > 3900 * (1.0 - 1.2 * lost - 1.2 * delay / RETEST_TICKS)
     assert (fresh == delay).mean() > 0.9
     assert (fresh >= delay).mean() > 0.95
@@ -103,7 +103,7 @@ def test_a_falcon_whose_replies_come_late_is_believed_to_be_late(delay_s, ticks)
         reader = servo.telemetry.reader()
         servo.advance(300)
         assert set(reader.read().delay_ticks) == {1}
-        device.hand.faults.last(delay_s=delay_s)
+        device.hand.faults.set_durations(delay_s=delay_s)
         device.hand.faults.chance("delay", 1.0 if delay_s else 0.0)
         servo.advance(100)
         believed = reader.read().delay_ticks
@@ -112,9 +112,9 @@ def test_a_falcon_whose_replies_come_late_is_believed_to_be_late(delay_s, ticks)
         servo.stop()
 
 
-def test_a_falcon_that_is_late_when_it_is_opened_says_so():
+def test_a_falcon_that_is_late_when_opened_is_reported():
     emulator = Emulator(running=True, tremor_m=0.0)
-    emulator.faults.last(delay_s=1.5e-3)
+    emulator.faults.set_durations(delay_s=1.5e-3)
     emulator.faults.chance("delay", 1.0)
     with EmulatedFalcon(emulator=emulator) as device:
         described = device.describe()

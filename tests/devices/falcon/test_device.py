@@ -1,4 +1,4 @@
-"""What the Falcon's driver adds to the contract: its program, homing, calibration, and a guard that may die."""
+"""The Falcon's driver beyond the contract: firmware, homing, calibration, and a guard that may die."""
 
 import hashlib
 import json
@@ -38,7 +38,7 @@ def still(**options):
 
 
 class Guard:
-    """Keeps what it was told."""
+    """A guard that records its orders."""
 
     def __init__(self):
         self.orders = []
@@ -48,44 +48,44 @@ class Guard:
 
 
 @pytest.fixture
-def told():
+def messages():
     return []
 
 
 @pytest.fixture
-def opened(told):
-    with EmulatedFalcon(emulator=still(), progress=told.append) as device:
+def falcon(messages):
+    with EmulatedFalcon(emulator=still(), progress=messages.append) as device:
         yield device
 
 
 class TestOpening:
-    def test_it_is_homed_by_a_hand_that_does_what_it_is_told(self, opened, told):
-        assert told == [STROKES, PULL_OUT, READY]
-        assert (opened.hand.homed, opened.hand.lights) == (0b111, constants.FLAG_GREEN)
-        assert opened.hand.highest_torque == 0
-        ticks = Ticks(opened)
+    def test_it_is_homed_by_a_hand_that_follows_the_instructions(self, falcon, messages):
+        assert messages == [STROKES, PULL_OUT, READY]
+        assert (falcon.hand.homed, falcon.hand.lights) == (0b111, constants.FLAG_GREEN)
+        assert falcon.hand.highest_torque == 0
+        ticks = Ticks(falcon)
         assert ticks.after(2) == READ_NEW
         assert np.abs(ticks.position_m).max() < 1e-3
-        described = opened.describe()
+        described = falcon.describe()
         assert described["event_character"] is True
         assert described["round_trip_ms"]["with"] < 0.5 < described["round_trip_ms"]["without"]
         assert (described["serial"], described["firmware"]) == ("EMULATED", "already running")
         assert (described["geometry"], described["calibration"]) == ("libnifalcon", "none")
         assert described["units_per_nm"] == 6616.0
 
-    def test_a_falcon_that_was_switched_on_is_given_its_program(self, tmp_path, told, monkeypatch):
+    def test_a_falcon_that_was_switched_on_is_given_its_program(self, tmp_path, messages, monkeypatch):
         file = tmp_path / "secret-folder-firmware.bin"
         file.write_bytes(stream())
         digest = hashlib.sha256(stream()).hexdigest()
         for name in (None, "nvent_firmware.bin"):
             if name is not None:
                 monkeypatch.setitem(boot.KNOWN, (digest[:16], digest[-8:]), name)
-            with open_device("falcon-emulated", options={"firmware": file}, progress=told.append) as device:
+            with open_device("falcon-emulated", options={"firmware": file}, progress=messages.append) as device:
                 assert (device.hand.running, device.hand.homed) == (True, 0b111)
                 described = json.dumps(device.describe())
             assert json.loads(described)["firmware"] == digest
             assert "secret" not in described
-        loading = [line for line in told if line.startswith("Loading")]
+        loading = [line for line in messages if line.startswith("Loading")]
         assert len(loading) == 2
         assert f"an unrecognised version (SHA-256 {digest[:16]}…)" in loading[0]
         assert loading[1] == "Loading the Falcon's firmware, nvent_firmware.bin."
@@ -100,29 +100,29 @@ class TestOpening:
         ):
             EmulatedFalcon(workspace_m=(0.1, 0.03, 0.03))
 
-    def test_it_can_be_given_up(self, told):
-        device = EmulatedFalcon(emulator=still(), progress=told.append, cancelled=lambda: PULL_OUT in told)
+    def test_it_can_be_given_up(self, messages):
+        device = EmulatedFalcon(emulator=still(), progress=messages.append, cancelled=lambda: PULL_OUT in messages)
         with pytest.raises(DeviceError, match="cancelled"):
             device.open()
-        assert READY not in told
+        assert READY not in messages
 
 
 class TestForce:
-    def test_it_comes_in_over_half_a_second_and_is_never_there_before_homing(self, opened):
-        ticks = Ticks(opened)
+    def test_it_comes_in_over_half_a_second_and_is_never_there_before_homing(self, falcon):
+        ticks = Ticks(falcon)
         pushes = []
         for _ in range(700):
             ticks.after(1, (0.0, 0.0, 2.0))
-            pushes.append(opened.hand.force_n[2])
+            pushes.append(falcon.hand.force_n[2])
         assert np.diff(pushes).max() < 0.02
         assert pushes[249] == pytest.approx(1.0, abs=0.05)
         assert pushes[-1] == pytest.approx(2.0, rel=5e-3)
-        assert opened.hand.highest_unhomed_torque == 0
+        assert falcon.hand.highest_unhomed_torque == 0
 
     @pytest.mark.variants(1)
     @pytest.mark.parametrize("name", GEOMETRIES)
-    def test_the_emulators_own_mechanics_make_of_it_what_was_asked_for(self, name):
-        """Everywhere in the box that encoders are known to reach, in any direction, within half a percent."""
+    def test_the_emulated_mechanics_produce_the_requested_force(self, name):
+        """This holds everywhere in the reachable box, in any direction, within half a percent."""
         geometry = GEOMETRIES[name]
         mechanism, theta = new_mechanism(geometry, 1.0), np.zeros(3)
         random = Random(5)  # noqa: S311
@@ -146,10 +146,10 @@ class TestForce:
         assert max(errors) < 0.005
 
     @pytest.mark.parametrize("interrupted", ["quiet", "close"])
-    def test_an_end_that_is_interrupted_leaves_the_rest_to_the_guard(self, opened, monkeypatch, interrupted):
-        guard = opened.guard = Guard()
-        transport, close = opened.connection, opened.connection.close
-        ticks = Ticks(opened)
+    def test_an_end_that_is_interrupted_leaves_the_rest_to_the_guard(self, falcon, monkeypatch, interrupted):
+        guard = falcon.guard = Guard()
+        transport, close = falcon.connection, falcon.connection.close
+        ticks = Ticks(falcon)
         ticks.after(600, (1.0, 1.0, 1.0))
 
         def interrupt(*_):
@@ -161,13 +161,13 @@ class TestForce:
         else:
             monkeypatch.setattr(transport, "close", interrupt)
         with pytest.raises(KeyboardInterrupt):
-            opened.close()
+            falcon.close()
         assert guard.orders == (["release"] if interrupted == "quiet" else ["stand_down"])
         with pytest.raises(FalconLost):
             transport.write(b"", 1.0)
         assert ticks.after(1) == READ_LOST
 
-    def test_a_calibration_of_this_one_is_used_and_told_and_does_not_outlive_it(self):
+    def test_a_calibration_of_this_device_is_used_reported_and_not_kept(self):
         calibration.save_calibration(
             "OWN", Calibration(geometry="zm-redux", units_per_nm=9000.0, arm_offset_rad=0.05, measured="2026-11-20")
         )
@@ -189,37 +189,37 @@ class TestForce:
 
 
 class TestInUse:
-    def test_the_last_button_stops_the_force(self, opened):
-        ticks = Ticks(opened)
-        opened.hand.press(0b1000)
+    def test_the_last_button_stops_the_force(self, falcon):
+        ticks = Ticks(falcon)
+        falcon.hand.press(0b1000)
         ticks.after(3)
         assert ticks.reading[0].buttons == BUTTON_STOP
 
-    def test_closed_it_stays_homed_for_whoever_opens_it_next_and_its_lights_are_off(self, opened):
-        Ticks(opened).after(600, (1.0, 1.0, 1.0))
-        opened.close()
-        assert (opened.hand.torques, opened.hand.lights, opened.hand.homed) == (NONE, 0, 0b111)
+    def test_after_closing_it_stays_homed_with_its_lights_off(self, falcon):
+        Ticks(falcon).after(600, (1.0, 1.0, 1.0))
+        falcon.close()
+        assert (falcon.hand.torques, falcon.hand.lights, falcon.hand.homed) == (NONE, 0, 0b111)
 
     @pytest.mark.parametrize(("push_n", "order"), [(1.0, "leave"), (0.0, "stand_down")])
-    def test_a_cable_pulled_while_it_pushes_leaves_the_guard_waiting_for_it(self, opened, push_n, order):
-        guard = opened.guard = Guard()
-        ticks = Ticks(opened)
+    def test_a_cable_pulled_while_it_pushes_leaves_the_guard_waiting_for_it(self, falcon, push_n, order):
+        guard = falcon.guard = Guard()
+        ticks = Ticks(falcon)
         ticks.after(600, (0.0, push_n, 0.0))
-        opened.hand.faults.on("unplugged")
+        falcon.hand.faults.on("unplugged")
         ticks.after(1)
-        opened.close()
+        falcon.close()
         assert guard.orders == [order]
         with pytest.raises(DeviceError):
-            opened.open()
-        opened.hand.faults.off("unplugged")
+            falcon.open()
+        falcon.hand.faults.off("unplugged")
         for _ in range(2):
-            opened.open()
-            opened.close()
+            falcon.open()
+            falcon.close()
         assert guard.orders == ([order, "recall"] if push_n else [order])
 
 
 class TestGuard:
-    """Without a guard nothing would end its torque, so it gets none."""
+    """Without a guard nothing would end the torque, so the device gets none."""
 
     def test_without_its_guard_it_does_not_push(self):
         device = EmulatedFalcon(emulator=still())

@@ -42,12 +42,12 @@ GREAT_N = tuple(20 * np.array(PUSH_N))
 
 
 class Recorded(Ticks):
-    """Ticks that keep what they do as lines: one in ``every``."""
+    """Ticks that record one in ``every`` as a line."""
 
     def __init__(self) -> None:
         super().__init__()
         self.lines: list[str] = []
-        self.every, self.taken = 1, 0
+        self.every, self.tick_count = 1, 0
         self.falcon.force_limit_n = 8.0
 
     def tick(self, *replies: bytes, **how: Any) -> tuple[int, int]:
@@ -61,12 +61,12 @@ class Recorded(Ticks):
         if went and not falcon.share:
             assert self.torques == [0, 0, 0]
         assert size_n <= 8.0 * 1.001 or falcon.force_limit_n > 8.0
-        self.taken += 1
-        if self.taken % self.every == 0:
+        self.tick_count += 1
+        if self.tick_count % self.every == 0:
             flags = [f"{int(packet[13] - 0x41):04b}" for packet in went]
             vectors = np.round([1e3 * self.position_m, sent_n], 2) + 0.0
-            recorded = [" ".join(f"{one:.2f}" for one in vector) for vector in vectors]
-            answer = " ".join(ANSWERS[one] for one in answers)
+            recorded = [" ".join(f"{value:.2f}" for value in vector) for vector in vectors]
+            answer = " ".join(ANSWERS[code] for code in answers)
             self.lines.append(f"{answer} | {' | '.join(recorded)} | {self.reading[0].buttons} | {' '.join(flags)}")
         return answers
 
@@ -243,7 +243,7 @@ def swift_hands(recorded: Recorded) -> None:
         recorded.lines.clear()
         refused = int(recorded.falcon.refused)
         while x < 0.035:
-            recorded.tick(*[] if recorded.taken % 7 == 3 else [reply((x, 0.0, 0.0))] * recorded.falcon.asked)
+            recorded.tick(*[] if recorded.tick_count % 7 == 3 else [reply((x, 0.0, 0.0))] * recorded.falcon.asked)
             v = min(v + 0.1, speed_mps)  # 10 g
             x += v / 1000
         assert recorded.falcon.refused == refused
@@ -256,7 +256,9 @@ SCENARIOS = (
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_what_the_exchange_answers_and_sends(scenario: Callable[[Recorded], None], pytestconfig: pytest.Config) -> None:
+def test_the_exchange_answers_and_sends_as_recorded(
+    scenario: Callable[[Recorded], None], pytestconfig: pytest.Config
+) -> None:
     recorded = Recorded()
     scenario(recorded)
     recorded.lines.append(" ".join(f"{name} {recorded.falcon[name]}" for name in COUNTERS if recorded.falcon[name]))

@@ -1,4 +1,4 @@
-"""A Falcon's modes of failure: the facts that show them, refusals of a faulty emulator, and what a doctor finds."""
+"""A Falcon's failure modes: their symptoms, refusals of a faulty emulator, and findings of the doctor."""
 
 import sys
 
@@ -61,9 +61,9 @@ class TestFaultsOfTheEmulator:
     def test_one_that_cannot_be_opened_or_homed(self, fault, mode):
         emulator = Emulator(running=True)
         emulator.faults.on(fault)
-        told = []
-        has_words_of(refused(emulator, progress=told.append), mode)
-        assert sum(line.startswith("Still homing") for line in told) >= 4 * (mode in {"frozen", "stroke-in"})
+        messages = []
+        has_words_of(refused(emulator, progress=messages.append), mode)
+        assert sum(line.startswith("Still homing") for line in messages) >= 4 * (mode in {"frozen", "stroke-in"})
         emulator.faults.off(fault)
         with EmulatedFalcon(emulator=emulator):  # it was let go of, and can be tried again
             assert emulator.homed == 0b111
@@ -76,12 +76,12 @@ class TestFaultsOfTheEmulator:
             ("Homing", lambda emulator: emulator.faults.on("unplugged"), "unplugged"),
         ],
     )
-    def test_what_happens_while_it_is_homed(self, at, happens, mode):
+    def test_events_during_homing_end_in_their_failure(self, at, happens, mode):
         emulator = Emulator(running=True)
         failure = refused(emulator, progress=lambda line: happens(emulator) if line.startswith(at) else None)
         has_words_of(failure, mode)
 
-    def test_no_firmware_one_that_is_none_and_one_that_does_not_arrive(self, firmware, tmp_path):
+    def test_missing_invalid_and_undelivered_firmware(self, firmware, tmp_path):
         has_words_of(refused(Emulator()), "firmware-file")
         page = tmp_path / "page.bin"
         page.write_text("<!DOCTYPE html><html>", encoding="utf-8", newline="\n")
@@ -98,7 +98,7 @@ class TestFaultsOfTheEmulator:
         assert "byte" in str(failure)
 
     @pytest.mark.parametrize("fault", HARMLESS)
-    def test_what_a_driver_copes_with_is_no_failure(self, fault, firmware):
+    def test_tolerable_faults_do_not_stop_the_servo(self, fault, firmware):
         emulator = Emulator()
         emulator.faults.on(fault)
         with EmulatedFalcon(emulator=emulator, firmware=firmware) as device:
@@ -110,7 +110,7 @@ class TestFaultsOfTheEmulator:
     @pytest.mark.parametrize(
         ("unhomed", "read_errors", "cause"), [(1, 0, "no longer homed"), (0, 90, "did not complete")]
     )
-    def test_in_use_a_lost_homing_and_failed_transfers_are_told_apart(self, unhomed, read_errors, cause):
+    def test_lost_homing_and_failed_transfers_in_use_are_distinguished(self, unhomed, read_errors, cause):
         with EmulatedFalcon(emulator=Emulator(running=True)) as device:
             state = device.exchange
             state.apart, state.unhomed, state.read_errors, state.ticks = 100, unhomed, read_errors, 1
@@ -135,25 +135,25 @@ class TestDoctor:
             (("power-off",), ["firmware-file"]),
         ],
     )
-    def test_it_finds_what_is_wrong_and_nothing_else(self, faults, modes):
+    def test_the_doctor_finds_exactly_the_faults(self, faults, modes):
         examined = examine("falcon-emulated", faults=faults, progress=str)
-        assert [one.id for one in examined.found] == modes
+        assert [finding.id for finding in examined.found] == modes
         assert (examined.failure is None) == (not modes or modes == ["broken-packets"])
 
-    def test_it_says_what_it_saw(self, firmware):
-        told = []
-        examined = examine("falcon-emulated", options={"firmware": firmware}, progress=told.append)
+    def test_the_doctor_reports_its_observations(self, firmware):
+        messages = []
+        examined = examine("falcon-emulated", options={"firmware": firmware}, progress=messages.append)
         assert any(line.startswith("round trip 0.") for line in examined.seen)
         assert "opened, serial number EMULATED" in examined.seen
-        assert any(line.startswith("Homing") for line in told)
+        assert any(line.startswith("Homing") for line in messages)
 
     @pytest.mark.parametrize("fault", ["frozen", "unplugged"])
-    def test_what_happens_after_homing_is_found(self, fault, monkeypatch):
+    def test_faults_after_homing_are_found(self, fault, monkeypatch):
         emulator = Emulator(running=True)
         device = EmulatedFalcon(emulator=emulator)
         monkeypatch.setattr(EmulatedFalcon, "of", lambda _request: device)
         examined = examine(
             "falcon-emulated", progress=lambda line: emulator.faults.on(fault) if line.startswith("Hold") else None
         )
-        assert [one.id for one in examined.found] == [fault]
+        assert [finding.id for finding in examined.found] == [fault]
         assert fault == "frozen" or FAILURES.mode("unplugged").cure in examined.failure

@@ -1,4 +1,4 @@
-"""A firmware file word by word, requests to a bridge in their order, and what a diagnosis makes of a device."""
+"""A firmware file word by word, the order of requests to a bridge, and the diagnosis of a device."""
 
 import hashlib
 from types import SimpleNamespace
@@ -55,7 +55,7 @@ def test_a_firmware_has_an_entry_and_blocks_with_their_places(monkeypatch: pytes
         (SMALL + b"xyz", "3 bytes follow the end marker at byte 42"),
     ],
 )
-def test_what_is_no_firmware_is_refused_with_the_byte(data: bytes, reason: str) -> None:
+def test_invalid_firmware_is_refused_with_the_byte(data: bytes, reason: str) -> None:
     with pytest.raises(DeviceFailure) as refused:
         check_firmware(data)
     assert refused.value.mode == "not-firmware"
@@ -63,7 +63,7 @@ def test_what_is_no_firmware_is_refused_with_the_byte(data: bytes, reason: str) 
 
 
 class Bridge:
-    """A bridge that keeps what it is asked and answers nothing."""
+    """A bridge that records requests and does not answer."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[Any, ...]] = []
@@ -113,13 +113,13 @@ def test_a_falcon_runs_if_it_answers_one_of_ten_packets(
     monkeypatch: pytest.MonkeyPatch, silent: int, is_running: bool, purges: int
 ) -> None:
     replies = [False] * silent + [True] * 10
-    asked: list[float] = []
+    timeouts_s: list[float] = []
     monkeypatch.setattr(
-        boot, "_Line", lambda _bridge: SimpleNamespace(gets_reply=lambda s: asked.append(s) or replies.pop(0))
+        boot, "_Line", lambda _bridge: SimpleNamespace(gets_reply=lambda s: timeouts_s.append(s) or replies.pop(0))
     )
     bridge: Any = Bridge()
     assert boot.is_running(bridge) == is_running
-    assert (bridge.asked, set(asked)) == (PURGED * purges, {0.05})
+    assert (bridge.asked, set(timeouts_s)) == (PURGED * purges, {0.05})
 
 
 def test_a_round_trip_is_the_median_of_50_and_a_missing_reply_counts_as_50_ms(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -181,7 +181,7 @@ def test_an_echo_is_compared_byte_by_byte(echo: bytes, reason: str | None) -> No
         (-99, "io", UsbFailure),
     ],
 )
-def test_an_error_of_libusb_is_told_with_its_number_and_what_was_done(
+def test_a_libusb_error_is_reported_with_its_number_and_action(
     code: int, kind: str, kind_of_error: type[UsbFailure], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     failure = usb_failure(code, "reading")
@@ -195,24 +195,24 @@ def test_an_error_of_libusb_is_told_with_its_number_and_what_was_done(
         assert usb_failure(code, "reading").mode == expected
 
 
-def test_a_firmware_is_loaded_only_if_none_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
-    told: list[Any] = []
-    monkeypatch.setattr(boot, "configure", lambda bridge: told.append(("configure", bridge)))
+def test_firmware_is_loaded_only_if_none_is_running(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+    calls: list[Any] = []
+    monkeypatch.setattr(boot, "configure", lambda bridge: calls.append(("configure", bridge)))
     monkeypatch.setattr(boot, "is_running", lambda _bridge: running)
     monkeypatch.setattr(
-        boot, "boot_falcon", lambda bridge, data, progress: told.append((bridge, data)) or check_firmware(data)
+        boot, "boot_falcon", lambda bridge, data, progress: calls.append((bridge, data)) or check_firmware(data)
     )
     file = tmp_path / "firmware.bin"
     file.write_bytes(SMALL)
-    device: Any = SimpleNamespace(_firmware=file, _progress=told.append)
+    device: Any = SimpleNamespace(_firmware=file, _progress=calls.append)
     running = True
     bridge: Any = "bridge"
     assert FalconDevice._run_firmware(device, bridge) == "already running"
-    assert told == [("configure", "bridge")]
+    assert calls == [("configure", "bridge")]
     running = False
     digest = hashlib.sha256(SMALL).hexdigest()
     assert FalconDevice._run_firmware(device, bridge) == digest
-    assert told[2:] == [
+    assert calls[2:] == [
         f"Loading the Falcon's firmware, an unrecognised version (SHA-256 {digest[:16]}…).", ("bridge", SMALL),
     ]  # fmt: skip
     for firmware, reason in ((None, ""), (tmp_path / "none.bin", f"{tmp_path / 'none.bin'} cannot be read: No such")):
@@ -224,7 +224,7 @@ def test_a_firmware_is_loaded_only_if_none_runs(monkeypatch: pytest.MonkeyPatch,
 
 
 @pytest.mark.parametrize(
-    ("changes", "share", "seen"),
+    ("changes", "share", "lines"),
     [
         (
             {}, 0.0123,
@@ -238,15 +238,15 @@ def test_a_firmware_is_loaded_only_if_none_runs(monkeypatch: pytest.MonkeyPatch,
         ),
     ],
 )  # fmt: skip
-def test_what_was_seen_of_a_falcon_is_told_in_a_line_each(
-    changes: dict[str, Any], share: float, seen: tuple[str, ...]
+def test_each_observation_of_a_falcon_is_one_line(
+    changes: dict[str, Any], share: float, lines: tuple[str, ...]
 ) -> None:
     facts = {
         "serial": "FT1", "firmware": "already running", "round_trip_ms": {"with": 0.31, "without": 1.9},
         "event_character": True, "calibration": {"measured": "2026-11-20"},
     }  # fmt: skip
     device: Any = SimpleNamespace(found=facts | changes, _broken_share=share)
-    assert FalconDevice.observed(device) == seen
+    assert FalconDevice.observed(device) == lines
 
 
 @pytest.mark.parametrize(
@@ -269,12 +269,12 @@ def test_the_reply_to_the_last_packet_is_not_missing_yet(counters: tuple[int, in
         (0.0, 1.0, 9.0, "unplugged", {"unplugged"}),
     ],
 )
-def test_what_a_falcon_does_wrong_appears_in_its_samples_and_replies(
+def test_faults_of_a_falcon_appear_in_its_samples_and_replies(
     moved_m: float, share: float, trip_ms: float, failure: str | None, modes: set[str]
 ) -> None:
     """The first hundred samples are those before it is gripped."""
     places_m = np.zeros((300, 3))
     places_m[:100, 0], places_m[200, 1] = 0.3, moved_m
-    found = {"round_trip_ms": {"with": trip_ms, "without": trip_ms + 3}}
-    device: Any = SimpleNamespace(failure_mode=failure, found=found, _broken_share=share)
+    facts = {"round_trip_ms": {"with": trip_ms, "without": trip_ms + 3}}
+    device: Any = SimpleNamespace(failure_mode=failure, found=facts, _broken_share=share)
     assert FalconDevice.appeared(device, {"position_m": places_m}) == modes

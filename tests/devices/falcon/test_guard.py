@@ -94,7 +94,7 @@ def test_a_program_that_is_killed_or_ends_without_a_word_leaves_no_torque(server
     capfd.readouterr()
 
 
-def test_a_program_that_says_the_word_has_done_it_itself(server):
+def test_a_program_that_stands_the_guard_down_has_ended_the_force_itself(server):
     running = program(server.path, "transport.close(); guard.stand_down()")
     assert ended(running) == 0
     assert server.bridge.sent == [PUSHING]
@@ -124,15 +124,15 @@ def test_a_guard_that_is_left_behind_waits_for_the_falcon_to_come_back(tmp_path)
 def test_a_guard_that_was_left_behind_is_recalled_when_the_falcon_is_opened_again(tmp_path, capfd):
     guard = guard_for(str(tmp_path / "falcon"))
     guard.start()
-    left = guard.child
+    orphan = guard.child
     guard.leave()
     guard.recall()
     guard.recall()
-    assert left.wait(PATIENCE_S / 2) != 0  # before its patience ends
+    assert orphan.wait(PATIENCE_S / 2) != 0  # before its patience ends
     assert capfd.readouterr().err == ""
 
 
-def test_what_ends_a_program_does_not_end_its_guard(server):
+def test_signals_that_end_a_program_do_not_end_its_guard(server):
     guard = guard_for(server.path)
     guard.start()
     child = guard.child
@@ -181,13 +181,13 @@ def test_a_guard_that_died_is_not_watching_and_ends_all_the_same(server):
     assert server.programs == 0
 
 
-def test_without_a_guard_there_is_no_force(monkeypatch):
+def test_a_falcon_without_a_guard_is_refused(monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(DeviceError, match="guard"):
         guard_for("falcon").start()
 
 
-def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
+def test_a_missing_falcon_is_reported(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(guarding, "PATIENCE_S", 0.0)
     monkeypatch.setattr(guarding.signal, "signal", lambda *_: None)
     with (tmp_path / "ended").open("w+", encoding="utf-8", newline="\n") as ended_at_once:

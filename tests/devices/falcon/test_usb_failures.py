@@ -1,4 +1,4 @@
-"""What libusb's errors mean: the class, the mode of failure and the words of each, on each system."""
+"""The meaning of libusb's errors: class, failure mode and text of each, on each system."""
 
 import pytest
 
@@ -46,7 +46,7 @@ def test_each_error_of_a_transfer_has_its_mode_of_failure(
     assert isinstance(error, DeviceNotFound) == (kind == "not-found")
 
 
-def test_without_a_transfer_no_code_is_told_and_each_system_has_its_own_words(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_transfer_no_code_is_stated_and_each_system_has_its_own_text(monkeypatch: pytest.MonkeyPatch) -> None:
     windows, linux = failures_on("win32"), failures_on("linux")
     monkeypatch.setattr(failures, "FAILURES", linux)
     error = UsbFailure("kernel-driver", "opening")
@@ -61,7 +61,7 @@ def test_without_a_transfer_no_code_is_told_and_each_system_has_its_own_words(mo
     assert UsbFailure("kernel-driver", "opening").mode == "kernel-driver", "a mode of another system has its words too"
 
 
-def test_the_numbers_and_files_that_are_told_are_those_of_the_program() -> None:
+def test_stated_numbers_and_files_equal_those_of_the_program() -> None:
     linux = failures_on("linux")
     rule = 'SUBSYSTEM=="usb", ATTR{idVendor}=="0403", ATTR{idProduct}=="cb48", TAG+="uaccess"'
     file, reload = "/etc/udev/rules.d/60-falcon.rules", "sudo udevadm control --reload"

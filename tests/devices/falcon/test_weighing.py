@@ -32,11 +32,11 @@ def emulated(**options):
 
 
 def helper(emulator, weight_n=WEIGHT_N, *, readings=None, lags=0):
-    """Return what does as it is asked, some ticks later, and the list of what that was."""
-    asked = []
+    """Return a scripted operator that acts ``lags`` ticks after each request, and the list of its requests."""
+    kinds = []
 
     def ask(kind, _words):
-        asked.append(kind)
+        kinds.append(kind)
         waits = iter([None] * lags)
         if kind in {"hang", "pull"}:
             emulator.weight_n = weight_n
@@ -46,14 +46,14 @@ def helper(emulator, weight_n=WEIGHT_N, *, readings=None, lags=0):
         answer = next(readings) if kind == "reading" else ""
         return lambda: next(waits, answer)
 
-    return ask, asked
+    return ask, kinds
 
 
 def weighed(emulator, weight_n=WEIGHT_N):
-    ask, asked = helper(emulator, weight_n)
+    ask, kinds = helper(emulator, weight_n)
     with EmulatedFalcon(emulator=emulator) as device:
         notes = measure_with_weight(Grip(device, virtual=True), weight_n, ask)
-    return notes, asked
+    return notes, kinds
 
 
 class TestAWeight:
@@ -63,16 +63,16 @@ class TestAWeight:
     )
     def test_tells_gain_and_offset_of_the_emulated_arms(self, gain, offset_deg, geometry):
         emulator = emulated(units_per_nm=gain, arm_offset_rad=(math.radians(offset_deg),) * 3, geometry=geometry)
-        notes, asked = weighed(emulator)
-        assert asked == ["let-go", "hang", "take-off"]
-        found = fit(GEOMETRIES[geometry], notes.counts, notes.forces_n, notes.units)
-        assert found.units_per_nm == pytest.approx(gain, rel=0.01)
-        assert math.degrees(found.arm_offset_rad) == pytest.approx(offset_deg, abs=0.3)
-        assert found.own_weight_n == pytest.approx(0.0, abs=0.03)
-        assert found.poses == 4 * len(PLACES_M)
-        left = residual_forces(found, notes.counts, notes.forces_n, notes.units)
-        assert math.sqrt((left**2).sum() / len(left)) == pytest.approx(found.residual_n)
-        assert np.abs(left).max() < 0.12  # 0.1 N of it is the friction of the emulated arms
+        notes, kinds = weighed(emulator)
+        assert kinds == ["let-go", "hang", "take-off"]
+        calibration = fit(GEOMETRIES[geometry], notes.counts, notes.forces_n, notes.units)
+        assert calibration.units_per_nm == pytest.approx(gain, rel=0.01)
+        assert math.degrees(calibration.arm_offset_rad) == pytest.approx(offset_deg, abs=0.3)
+        assert calibration.own_weight_n == pytest.approx(0.0, abs=0.03)
+        assert calibration.poses == 4 * len(PLACES_M)
+        residuals_n = residual_forces(calibration, notes.counts, notes.forces_n, notes.units)
+        assert math.sqrt((residuals_n**2).sum() / len(residuals_n)) == pytest.approx(calibration.residual_n)
+        assert np.abs(residuals_n).max() < 0.12  # 0.1 N of it is the friction of the emulated arms
 
     @pytest.mark.parametrize("weight_n", [0.5, 6.5, -1.0, math.nan])
     def test_one_that_tells_nothing_or_is_too_heavy_is_refused(self, weight_n):
@@ -84,26 +84,26 @@ class TestAWeight:
 class TestAScale:
     def test_tells_the_gain_as_a_weight_does(self):
         emulator = emulated(units_per_nm=9000.0)
-        ask, asked = helper(emulator, readings=repeat("400"), lags=5)
+        ask, kinds = helper(emulator, readings=repeat("400"), lags=5)
         with EmulatedFalcon(emulator=emulator) as device:
             notes = measure_with_scale(Grip(device, virtual=True), ask)
-        assert asked == ["let-go", *["pull", "reading", "let-go"] * len(PLACES_M), "take-off"]
-        found = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)
-        assert found.units_per_nm == pytest.approx(9000, rel=0.04)
+        assert kinds == ["let-go", *["pull", "reading", "let-go"] * len(PLACES_M), "take-off"]
+        calibration = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)
+        assert calibration.units_per_nm == pytest.approx(9000, rel=0.04)
 
-    def test_a_reading_that_is_none_is_asked_for_again(self):
+    def test_an_invalid_reading_is_requested_again(self):
         emulator = emulated()
         wrong = ["", "four", "-3", "0", "900", "nan"]
-        ask, asked = helper(emulator, readings=chain(wrong, repeat("400")))
+        ask, kinds = helper(emulator, readings=chain(wrong, repeat("400")))
         words = []
         with EmulatedFalcon(emulator=emulator) as device:
             notes = measure_with_scale(
                 Grip(device, virtual=True), lambda kind, said: words.append(said) or ask(kind, said)
             )
-        assert asked.count("reading") == len(wrong) + len(PLACES_M)
+        assert kinds.count("reading") == len(wrong) + len(PLACES_M)
         assert [said for said in words if "is not a weight between" in said][1].startswith("'four' is")
-        found = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)
-        assert found.units_per_nm == pytest.approx(6616, rel=0.04)
+        calibration = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)
+        assert calibration.units_per_nm == pytest.approx(6616, rel=0.04)
 
 
 class TestTheGrip:

@@ -26,11 +26,11 @@ from tests.devices.subjects import until, write
 pytestmark = [needs_servo, *needs_standin]
 
 
-def opened(standin: StandIn, name: str = "force-dimension", **limits: Any) -> Any:
+def open_with_stand_in(standin: StandIn, name: str = "force-dimension", **limits: Any) -> Any:
     return open_device(name, options={"dhd-library": standin.path}, **limits)
 
 
-def ticking(device: Any) -> Any:
+def servo_in_stroke(device: Any) -> Any:
     """Return a servo in mid-stroke through honey; a reading of the stand-in is a millisecond."""
     from study_app.haptics.runtime.clocks import VirtualClock
     from study_app.haptics.runtime.servo import Servo
@@ -75,34 +75,38 @@ class TestLibrary:
         standin.fault("no-device")
         assert probe().state == NONE
         monkeypatch.setenv(VARIABLE, str(standin.path.with_name("nowhere.so")))
-        found = probe()
-        assert found.state == NOT_AVAILABLE
-        assert VARIABLE in found.why
+        backend = probe()
+        assert backend.state == NOT_AVAILABLE
+        assert VARIABLE in backend.why
         assert standin.state["open"] == 0.0
 
 
 class TestOpening:
     def test_safety_functions_stay_on_and_are_recorded(self, standin: StandIn) -> None:
-        with opened(standin) as device:
-            found = device.describe()
+        with open_with_stand_in(standin) as device:
+            description = device.describe()
             state = standin.state
             assert (state["time_guard"], state["watchdog"], state["gravity"]) == (-1.0, LONGEST_WATCHDOG, 1.0)
             assert state["force_on"] == 1.0
             assert state["force_n"] == [0.0, 0.0, 0.0]
-        assert found["velocity_threshold"] == 40
-        assert found["watchdog_s"] == pytest.approx(0.031875)
-        assert (found["sdk"], found["system"], found["serial"]) == ("3.17.5.0", "stand-in omega.7", "10233")
+        assert description["velocity_threshold"] == 40
+        assert description["watchdog_s"] == pytest.approx(0.031875)
+        assert (description["sdk"], description["system"], description["serial"]) == (
+            "3.17.5.0",
+            "stand-in omega.7",
+            "10233",
+        )
         state = standin.state
         assert (state["stopped"], state["force_on"], state["closed"]) == (1.0, 0.0, 1.0)
 
     def test_delay_count_and_mass_are_measured_and_read(self, standin: StandIn) -> None:
-        with opened(standin) as device:
-            found = device.dynamics
+        with open_with_stand_in(standin) as device:
+            dynamics = device.dynamics
             assert device.describe()["com_mode"] == 1
-        assert found.unknown == ()
-        assert 0.0 < found.delay_s < 1e-3
-        assert found.count_m == pytest.approx(10e-6)
-        assert found.mass_kg == pytest.approx(0.2)
+        assert dynamics.unknown == ()
+        assert 0.0 < dynamics.delay_s < 1e-3
+        assert dynamics.count_m == pytest.approx(10e-6)
+        assert dynamics.mass_kg == pytest.approx(0.2)
 
     @pytest.mark.parametrize(
         ("fault", "mode", "delay_s"), [("none", 1, 2 * 46e-5), ("guarded", 1, 2 * 45e-5), ("plain", 0, 46e-5)]
@@ -116,7 +120,7 @@ class TestOpening:
             steps = [900 if trip % 2 else 1 + 14 * trip % 50 for trip in range(50)]
         monkeypatch.setattr(library_module, "time", RoundTripClock([1e-5 * step for step in steps]))
         standin.fault(fault)
-        with opened(standin) as device:
+        with open_with_stand_in(standin) as device:
             facts = device.describe()
             assert device.dynamics.delay_s == pytest.approx(delay_s)
         has_wrist = fault != "plain"
@@ -127,12 +131,12 @@ class TestOpening:
         }  # fmt: skip
         assert {name: facts[name] for name in expected} == expected
 
-    def test_what_the_library_lacks_comes_from_the_latest_bench_or_is_assumed(
+    def test_values_missing_in_the_library_come_from_the_latest_bench_or_are_assumed(
         self, standin: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
         standin.fault("unmodelled")
-        with opened(standin) as device:
+        with open_with_stand_in(standin) as device:
             assert device.dynamics.assumed == device.dynamics.unknown == ("count_m", "mass_kg")
             assert device.dynamics[1:3] == UNKNOWN[1:3]
         axes = (0.31, 0.22, 0.4)
@@ -141,26 +145,26 @@ class TestOpening:
             friction_n=axes, delay_ms=axes, stable_nspm=axes, count_m=12e-6,
         )  # fmt: skip
         workstation.save_settings(workstation.DEFAULTS.with_bench(bench))
-        with opened(standin) as device:
+        with open_with_stand_in(standin) as device:
             assert device.dynamics.unknown == ()
             assert device.dynamics[1:3] == (12e-6, 0.22)
         workstation.save_settings(workstation.DEFAULTS.with_bench(bench.model_copy(update={"serial": "10234"})))
-        with opened(standin) as device:  # another one's
+        with open_with_stand_in(standin) as device:  # another one's
             assert device.dynamics.assumed == ("count_m", "mass_kg")
 
     def test_a_serial_number_chooses_the_device(self, standin: StandIn) -> None:
-        opened(standin, "force-dimension:10233").close()
+        open_with_stand_in(standin, "force-dimension:10233").close()
         with pytest.raises(DeviceNotFound, match="the library cannot open the device"):
-            opened(standin, "force-dimension:10234")
+            open_with_stand_in(standin, "force-dimension:10234")
         with pytest.raises(DeviceError, match="'left' is not a Force Dimension serial number"):
-            opened(standin, "force-dimension:left")
+            open_with_stand_in(standin, "force-dimension:left")
 
 
 class TestTicks:
     def test_position_velocity_buttons_orientation_and_gripper_are_in_the_hand_frame(self, standin: StandIn) -> None:
         standin.rotate([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # 90 degrees about the maker's z: up
         standin.loaded.standin_press(0b101)
-        with opened(standin) as device:
+        with open_with_stand_in(standin) as device:
             from study_app.haptics.runtime.clocks import VirtualClock
             from study_app.haptics.runtime.servo import Servo
 
@@ -189,14 +193,14 @@ class TestTicks:
 
         rotation = Rotation.from_rotvec(angle * np.array(axis) / np.linalg.norm(axis))
         standin.rotate(rotation.as_matrix())
-        with opened(standin) as device:
+        with open_with_stand_in(standin) as device:
             reading = new_reading()
             assert device.read.ctypes(device.context, 1_000_000, reading.ctypes.data) == 0
         toward, right, up, w = rotation.as_quat()  # of the maker's axes
         assert abs(reading[0].orientation @ (w, right, up, toward)) == pytest.approx(1.0, abs=1e-12)
 
-    def test_force_is_sent_in_the_makers_axes_and_motors_of_the_wrist_get_none(self, standin: StandIn) -> None:
-        with opened(standin, force_limit_n=4.0) as device:
+    def test_force_is_sent_in_the_makers_axes_and_not_to_the_wrist(self, standin: StandIn) -> None:
+        with open_with_stand_in(standin, force_limit_n=4.0) as device:
             assert write(device, (1.0, 2.0, -3.0))[1].tolist() == [1.0, 2.0, -3.0]
             state = standin.state
             assert state["force_n"] == [-3.0, 1.0, 2.0]
@@ -207,16 +211,16 @@ class TestTicks:
 
     def test_readings_that_the_time_guard_answers_are_not_new(self, standin: StandIn) -> None:
         standin.fault("guarded")
-        with opened(standin) as device:
-            servo = ticking(device)
+        with open_with_stand_in(standin) as device:
+            servo = servo_in_stroke(device)
             servo.check()
             assert device.counters["guarded"] == pytest.approx(500, abs=1)
             assert device.counters["fresh"] + device.counters["guarded"] == device.counters["ticks"]
 
     def test_forces_that_saturate_the_motors_are_counted_and_their_ticks_marked(self, standin: StandIn) -> None:
         standin.fault("saturated")
-        with opened(standin) as device:
-            servo = ticking(device)
+        with open_with_stand_in(standin) as device:
+            servo = servo_in_stroke(device)
             servo.check()
             assert device.counters["saturated"] >= 1000
             reader = servo.telemetry.reader()
@@ -233,14 +237,14 @@ def test_a_device_in_order_has_no_finding(standin: StandIn) -> None:
         "force-dimension", options={"dhd-library": standin.path}, progress=str
     )
     assert report.failure is None
-    assert not [one.id for one in report.found if one.id != "rate"]  # a loaded machine may be late
+    assert not [finding.id for finding in report.found if finding.id != "rate"]  # a loaded machine may be late
     assert standin.state["stopped"] == 1.0
 
 
 def test_a_call_that_lasts_ends_the_servo_and_the_force_once_it_returns(standin: StandIn) -> None:
     from study_app.haptics.runtime.servo import Servo
 
-    device = opened(standin)
+    device = open_with_stand_in(standin)
     servo = Servo(device)
     servo.start()
     standin.fault("slow")

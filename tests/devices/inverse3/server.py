@@ -52,19 +52,19 @@ class ServiceServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for one in (self._listener, *self._open):
+        for endpoint in (self._listener, *self._open):
             with suppress(OSError):
-                one.shutdown(socket.SHUT_RDWR)
-            one.close()
+                endpoint.shutdown(socket.SHUT_RDWR)
+            endpoint.close()
         for thread in self._threads:
             thread.join()
         self.service.follow_clock(0)
 
     def drop(self) -> None:
         """Close all connections, as a service that is killed does."""
-        for one in self._open:
+        for connection in self._open:
             with suppress(OSError):
-                one.shutdown(socket.SHUT_RDWR)
+                connection.shutdown(socket.SHUT_RDWR)
 
     def _start(self, work: Any, *arguments: Any) -> None:
         thread = threading.Thread(target=work, args=arguments, name="emulated Inverse Service", daemon=True)
@@ -110,7 +110,7 @@ class ServiceServer:
         service.take_bytes(head)
         connection.sendall(service.give_bytes())
         library = ctypes.CDLL("ws2_32" if sys.platform == "win32" else None)
-        send, receive = (ctypes.cast(one, ctypes.c_void_p).value or 0 for one in (library.send, library.recv))
+        send, receive = (ctypes.cast(function, ctypes.c_void_p).value or 0 for function in (library.send, library.recv))
         clock = (self._clock.now.address, self._clock.context)
         raise_priority()  # on a busy computer the servo's thread runs before others: so must what answers it
         while serve(memory, connection.fileno(), send, receive, clock, self._time):

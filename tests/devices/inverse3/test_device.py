@@ -1,4 +1,4 @@
-"""What the Inverse3's driver adds to the contract: settings of the service, states that stay out, and its addresses."""
+"""The Inverse3's driver beyond the contract: settings of the service, missing states, and its addresses."""
 
 import itertools
 import json
@@ -37,11 +37,11 @@ def service() -> Service:
 
 @pytest.fixture
 def device(service: Service) -> Iterator[EmulatedInverse3]:
-    with EmulatedInverse3(service=service) as one:
-        yield one
+    with EmulatedInverse3(service=service) as inverse3:
+        yield inverse3
 
 
-def exchanged(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+def recorded_messages(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     """Return a list that gets every message that a client sends while it opens a session, as the service reads it."""
     messages: list[dict[str, Any]] = []
     answer = Service._answer_message
@@ -58,19 +58,19 @@ class TestOpening:
     def test_the_first_message_neutralises_every_setting_that_a_message_can_set(
         self, service: Service, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        messages = exchanged(monkeypatch)
+        messages = recorded_messages(monkeypatch)
         with EmulatedInverse3(service=service) as device:
             settings = device.describe()["service_settings"]
         (first, second) = messages
-        (told,) = first["inverse3"]
-        assert told["device_id"] == "EMU1"
-        assert told["configure"] == {
+        (device_message,) = first["inverse3"]
+        assert device_message["device_id"] == "EMU1"
+        assert device_message["configure"] == {
             "preset": {"preset": "arm_front_centered"},
             "damping": {"scalar": 0.0, "vector": {"x": 0.0, "y": 0.0, "z": 0.0}},
             "force_gate": {"gain": 0.0},
         }
         assert first["session"]["configure"]["basis"] == {"permutation": "XYZ"}
-        assert told["commands"] == {"set_cursor_force": {"vector": {"x": 0.0, "y": 0.0, "z": 0.0}}}
+        assert device_message["commands"] == {"set_cursor_force": {"vector": {"x": 0.0, "y": 0.0, "z": 0.0}}}
         assert list(second["session"]) == ["force_render_full_state"]
         assert settings["found"]["filters"] == {"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.0}}
         assert settings["found"]["preset"] == "defaults"
@@ -85,7 +85,7 @@ class TestOpening:
         with pytest.raises(DeviceError, match=r"torque_scaling\.enabled is False, but must be True"):
             EmulatedInverse3(service=service).open()
 
-    def test_a_service_that_does_not_confirm_is_used_and_the_receipt_says_so(
+    def test_a_service_without_confirmation_is_used_and_noted_in_the_receipt(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr("study_app.devices.inverse3.opening.full_state_request", zero_force)

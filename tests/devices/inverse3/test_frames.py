@@ -43,7 +43,7 @@ def test_build_frame_uses_the_shortest_length_and_unmasks_to_the_payload(size: i
 
 
 @pytest.mark.parametrize(
-    ("frame", "found"),
+    ("frame", "header"),
     [
         (b"\x81\x05Hello", (2, TEXT, 5)),
         (b"\x89\x05Hello", (2, PING, 5)),
@@ -52,11 +52,9 @@ def test_build_frame_uses_the_shortest_length_and_unmasks_to_the_payload(size: i
         (b"\x81\x7f\x00\x00\x00\x00\x00\x01\x00\x00", (10, TEXT, 65536)),
     ],
 )
-def test_parse_header_reads_what_a_server_may_send_and_waits_for_the_rest(
-    frame: bytes, found: tuple[int, int, int]
-) -> None:
-    assert parsed(frame) == found
-    for cut in range(found[0]):
+def test_parse_header_reads_permitted_frames_and_waits_for_the_rest(frame: bytes, header: tuple[int, int, int]) -> None:
+    assert parsed(frame) == header
+    for cut in range(header[0]):
         assert parsed(frame[:cut])[0] == INCOMPLETE
 
 
@@ -73,7 +71,7 @@ def test_parse_header_reads_what_a_server_may_send_and_waits_for_the_rest(
         b"\x81\x7f\x80\x00\x00\x00\x00\x00\x00\x00",  # longer than any
     ],
 )
-def test_parse_header_refuses_what_a_server_must_not_send(frame: bytes) -> None:
+def test_parse_header_refuses_forbidden_frames(frame: bytes) -> None:
     assert parsed(frame)[0] == VIOLATION
 
 

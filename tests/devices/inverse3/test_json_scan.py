@@ -40,10 +40,10 @@ VALUES = st.recursive(
 
 
 def scanned(text: str | bytes, own: str = OWN) -> tuple[int, Any]:
-    found = records(SCAN, 1)[0]
-    found.own_id = text_hash(own.encode())
+    record = records(SCAN, 1)[0]
+    record.own_id = text_hash(own.encode())
     data = np.frombuffer(text if isinstance(text, bytes) else text.encode(), np.uint8)
-    return scan(data, 0, data.size, found), found
+    return scan(data, 0, data.size, record), record
 
 
 def state(**changes: Any) -> dict[str, Any]:
@@ -69,15 +69,15 @@ def state(**changes: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("indent", [None, 3])
 def test_scan_finds_the_numbers_of_its_own_device_in_any_order_of_keys(indent: int | None) -> None:
-    said, found = scanned(json.dumps(state(), indent=indent))
-    assert said == UNDERSTOOD
-    assert list(found.value[POSITION : POSITION + 3]) == pytest.approx([-0.0123, 1.5e-3, 0.15], rel=1e-14)
-    assert list(found.value[VELOCITY : VELOCITY + 3]) == [0.0, -1.0, 2.25]
-    assert (found.value[READY], found.value[CALIBRATED], found.value[BUTTON]) == (1.0, 0.0, 1.0)
-    assert list(found.value[BUTTONS : BUTTONS + 3]) == [0.0, 1.0, 0.0]
+    outcome, record = scanned(json.dumps(state(), indent=indent))
+    assert outcome == UNDERSTOOD
+    assert list(record.value[POSITION : POSITION + 3]) == pytest.approx([-0.0123, 1.5e-3, 0.15], rel=1e-14)
+    assert list(record.value[VELOCITY : VELOCITY + 3]) == [0.0, -1.0, 2.25]
+    assert (record.value[READY], record.value[CALIBRATED], record.value[BUTTON]) == (1.0, 0.0, 1.0)
+    assert list(record.value[BUTTONS : BUTTONS + 3]) == [0.0, 1.0, 0.0]
 
 
-def test_scan_names_what_is_missing() -> None:
+def test_scan_names_the_missing_value() -> None:
     assert scanned(json.dumps(state(inverse3=[])))[0] == NO_DEVICE
     assert scanned(json.dumps(state()), own="FFFF")[0] == NO_DEVICE
     assert scanned(json.dumps(state(inverse3=[{"device_id": OWN}])))[0] == WITHOUT_POSITION
@@ -87,13 +87,13 @@ def test_scan_names_what_is_missing() -> None:
 
 def test_scan_takes_no_number_of_another_device() -> None:
     own, other = state()["inverse3"][1::-1]
-    said, found = scanned(json.dumps(state(inverse3=[own, other, {"device_id": OWN}])))
-    assert said == UNDERSTOOD
-    assert found.value[POSITION] == -0.0123
+    outcome, record = scanned(json.dumps(state(inverse3=[own, other, {"device_id": OWN}])))
+    assert outcome == UNDERSTOOD
+    assert record.value[POSITION] == -0.0123
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "01", ".5", "5.", "1e", "+1", "0x1", "--1", "tru", "nul", "'a'"])
-def test_scan_refuses_what_is_no_number_of_json(number: str) -> None:
+def test_scan_refuses_numbers_that_json_does_not_allow(number: str) -> None:
     assert scanned(json.dumps(state()).replace("-0.0123", number))[0] == NOT_JSON
 
 
@@ -136,6 +136,6 @@ def test_scan_refuses_a_changed_byte_wherever_the_standard_library_does(data: st
 @settings(max_examples=300, deadline=None)
 @given(st.floats(-1e6, 1e6))
 def test_scan_reads_numbers_as_the_standard_library_does(number: float) -> None:
-    said, found = scanned(json.dumps(state()).replace("-0.0123", repr(number)))
-    assert said == UNDERSTOOD
-    assert math.isclose(found.value[POSITION], number, rel_tol=1e-14, abs_tol=1e-200)
+    outcome, record = scanned(json.dumps(state()).replace("-0.0123", repr(number)))
+    assert outcome == UNDERSTOOD
+    assert math.isclose(record.value[POSITION], number, rel_tol=1e-14, abs_tol=1e-200)

@@ -1,4 +1,4 @@
-"""Opening a session at the Inverse Service: which device is chosen, what is required of it, and what is described."""
+"""Opening a session at the Inverse Service: the chosen device, its requirements, and its description."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -83,7 +83,7 @@ def test_a_device_that_cannot_be_used_is_refused(status: dict[str, Any], at_open
 
 
 class Played:
-    """Messages that a service answers one after another; each zero force takes a millisecond more than the last."""
+    """Scripted answers of a service; each zero force takes a millisecond longer than the last."""
 
     def __init__(self, *answers: Any) -> None:
         self.answers = list(answers)
@@ -131,7 +131,7 @@ def test_a_session_is_described_with_the_settings_found_and_those_in_force() -> 
 
 
 @pytest.mark.parametrize(
-    ("in_force", "found", "words"),
+    ("in_force", "found_settings", "words"),
     [
         ({"preset": "defaults"}, {}, "preset is 'defaults', but must be 'arm_front_centered'"),
         ({"filters": {"force_gate": {"gain": 0.0}, "damping": 5}}, {}, "filters.damping.scalar is None, but must be 0"),
@@ -141,13 +141,13 @@ def test_a_session_is_described_with_the_settings_found_and_those_in_force() -> 
     ],
 )  # fmt: skip
 def test_settings_that_change_the_force_are_required(
-    in_force: dict[str, Any] | None, found: dict[str, Any], words: str | None
+    in_force: dict[str, Any] | None, found_settings: dict[str, Any], words: str | None
 ) -> None:
     """Without a confirmation only the settings that a message cannot set are required of those found."""
     state: dict[str, Any] = {"device_id": "A1"}
     if in_force is not None:
         state["config"] = GLOBAL | SCOPED | in_force
-    messages: Any = Played({"inverse3": [device("A1", config=FOUND | found)]}, {}, {"inverse3": [state]})
+    messages: Any = Played({"inverse3": [device("A1", config=FOUND | found_settings)]}, {}, {"inverse3": [state]})
     if words is None:
         assert open_session(messages, messages.link).described["service_settings"]["confirmed"] is False
         return

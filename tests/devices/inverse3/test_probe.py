@@ -9,7 +9,7 @@ import pytest
 from study_app.devices.doctor import DeviceFailure
 from study_app.devices.inverse3 import service
 from study_app.devices.inverse3.opening import FAILURES
-from study_app.devices.inverse3.service import SocketLink, force_scale, probe, shortened
+from study_app.devices.inverse3.service import SocketLink, probe, request_force_scale, shortened
 
 
 @pytest.mark.parametrize(
@@ -26,26 +26,26 @@ from study_app.devices.inverse3.service import SocketLink, force_scale, probe, s
         ({"inverse3": [{"device_id": "A1"}, {"device_id": ""}, {"device_id": "B-2"}]}, "connected: A1, B-2", None),
     ],
 )
-def test_a_service_is_told_with_its_devices(
+def test_a_service_is_described_with_its_devices(
     answer: Any, state: str, why: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[tuple[Any, ...]] = []
-    monkeypatch.setattr(service, "_get_json", lambda *given: asked.append(given) or answer)
-    told = probe("there", (1, 2))
-    assert asked == [("there", "/devices", (1, 2))]
-    assert (told.name, told.by, told.state) == ("inverse3", "Inverse Service", state)
-    assert told.why == ("" if why is None else FAILURES.sentence(why))
-    assert told.can.startswith("force through Inverse Service 3.5 or later")
+    requests: list[tuple[Any, ...]] = []
+    monkeypatch.setattr(service, "_get_json", lambda *request: requests.append(request) or answer)
+    backend = probe("there", (1, 2))
+    assert requests == [("there", "/devices", (1, 2))]
+    assert (backend.name, backend.by, backend.state) == ("inverse3", "Inverse Service", state)
+    assert backend.why == ("" if why is None else FAILURES.sentence(why))
+    assert backend.can.startswith("force through Inverse Service 3.5 or later")
 
 
 def test_the_force_scale_is_asked_by_its_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[Any, ...]] = []
-    monkeypatch.setattr(service, "_get_json", lambda *given: asked.append(given) or 1.5)
-    assert force_scale("there", (1, 2)) == 1.5
-    assert asked == [("there", "/settings/devices/force_scale", (1, 2))]
+    requests: list[tuple[Any, ...]] = []
+    monkeypatch.setattr(service, "_get_json", lambda *request: requests.append(request) or 1.5)
+    assert request_force_scale("there", (1, 2)) == 1.5
+    assert requests == [("there", "/settings/devices/force_scale", (1, 2))]
 
 
-def test_the_data_of_a_service_are_told_in_eighty_characters_of_a_line() -> None:
+def test_data_of_a_service_are_shortened_to_eighty_characters() -> None:
     assert shortened({"a": 1}) == "{'a': 1}"
     assert shortened("a\nb") == r"'a\nb'"
     long = shortened(dict.fromkeys(range(9), 40 * "x"))
@@ -64,7 +64,7 @@ def peer() -> Iterator[tuple[SocketLink, socket.socket]]:
         link.close()
 
 
-def test_a_link_sends_all_and_receives_what_there_is(peer: tuple[SocketLink, socket.socket]) -> None:
+def test_a_link_sends_all_and_receives_the_available_bytes(peer: tuple[SocketLink, socket.socket]) -> None:
     link, other = peer
     link.send(b"question")
     assert other.recv(100) == b"question"
@@ -89,7 +89,7 @@ def test_a_link_that_is_closed_is_silent_at_both_ends(peer: tuple[SocketLink, so
     link.close()
 
 
-def test_what_takes_longer_than_a_link_may_take_has_no_reply() -> None:
+def test_a_link_that_exceeds_its_time_limit_reports_no_reply() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         link = SocketLink("127.0.0.1", port, 0.05)

@@ -10,7 +10,7 @@ import pytest
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE
 from study_app.devices.doctor import DeviceFailure
 from study_app.devices.emulators.inverse3_service import Service
-from study_app.devices.inverse3.service import SocketLink, check_force_scale, force_scale, probe
+from study_app.devices.inverse3.service import SocketLink, check_force_scale, probe, request_force_scale
 from study_app.devices.registry import open_device
 from study_app.errors import DeviceLost
 from study_app.haptics.runtime.servo import Servo
@@ -35,7 +35,7 @@ def server(service: Service) -> Iterator[ServiceServer]:
 
 
 def moved_by(service: Service) -> bool:
-    """Tell whether the hand meets a force; go on reaching from side to side."""
+    """Return whether a force acts on the hand; continue reaching from side to side."""
     if not service.moving:
         service.reach_to(-0.03 if service.aim_m[0] > 0.0 else 0.03, 0.0, 0.0, duration_s=0.4)
     return bool(np.linalg.norm(service.force_n) > 0.5)
@@ -67,7 +67,7 @@ def test_a_service_that_is_killed_in_a_stroke_ends_in_its_message(service: Servi
 
 
 def test_closing_a_connection_with_unread_replies_does_not_reset_it() -> None:
-    """A reset may throw away the zero force that was sent last."""
+    """A reset may discard the zero force that was sent last."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         link = SocketLink("127.0.0.1", listener.getsockname()[1])
         connection, _ = listener.accept()
@@ -80,20 +80,20 @@ def test_closing_a_connection_with_unread_replies_does_not_reset_it() -> None:
 
 
 def test_a_device_is_probed_without_a_session(service: Service, server: ServiceServer) -> None:
-    found = probe(ports=(server.port,))
-    assert found.state == "connected: EMU1"
-    assert found.why == ""
-    assert check_force_scale(force_scale("127.0.0.1", (server.port,))) == 1.0
+    backend = probe(ports=(server.port,))
+    assert backend.state == "connected: EMU1"
+    assert backend.why == ""
+    assert check_force_scale(request_force_scale("127.0.0.1", (server.port,))) == 1.0
     service.set_fault("no-device")
     assert probe(ports=(server.port,)).state == NONE
 
 
-def test_without_a_service_the_probe_says_what_to_start() -> None:
+def test_without_a_service_the_probe_recommends_starting_haply_hub() -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    found = probe(ports=(port,))
-    assert found.state == NOT_AVAILABLE
-    assert "start Haply Hub" in found.why
+    backend = probe(ports=(port,))
+    assert backend.state == NOT_AVAILABLE
+    assert "start Haply Hub" in backend.why
 
 
 @pytest.mark.parametrize("answer", [b"1", b"1.0", b'{"value": 1}', b'{"devices/force_scale": 1.0}'])
@@ -101,7 +101,7 @@ def test_a_force_scale_of_1_is_understood_in_each_shape(answer: bytes, monkeypat
     monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")  # where nothing answers
     monkeypatch.setattr("urllib.request._opener", None)
     with serving(http_answer(answer)) as port:
-        assert check_force_scale(force_scale("127.0.0.1", (port,))) == 1.0
+        assert check_force_scale(request_force_scale("127.0.0.1", (port,))) == 1.0
 
 
 HUGE = b"1" + b"0" * 400
@@ -119,7 +119,7 @@ UNKNOWN = (
 )
 def test_any_other_answer_about_the_force_scale_is_refused_in_a_line(answer: bytes, mode: str) -> None:
     with serving(http_answer(answer)) as port, pytest.raises(DeviceFailure) as refused:
-        check_force_scale(force_scale("127.0.0.1", (port,)))
+        check_force_scale(request_force_scale("127.0.0.1", (port,)))
     assert refused.value.mode == mode
     assert "\n" not in str(refused.value)
     assert len(str(refused.value)) < 400

@@ -1,4 +1,4 @@
-"""Services that hang or answer something else: opening, probe and doctor end in a line within three seconds."""
+"""Services that hang or answer incorrectly: opening, probe and doctor end with one line within three seconds."""
 
 import base64
 import hashlib
@@ -16,7 +16,7 @@ import pytest
 
 from study_app.devices.driver import examine
 from study_app.devices.emulators.inverse3_service import Service
-from study_app.devices.inverse3.service import force_scale, probe, shortened
+from study_app.devices.inverse3.service import probe, request_force_scale, shortened
 from tests.compiled import needs_servo
 from tests.strangers import CLOSE, HTTP_OK, STRANGERS, Parts, dripped, flooded, http_answer, sent, serving
 
@@ -54,15 +54,15 @@ def upgraded(head: bytes) -> bytes:
 
 
 class Kind(NamedTuple):
-    """A kind of service: what it sends at each of its stages, and the mode of failure of opening it.
+    """A kind of service: its output at each stage, and the failure mode of opening it.
 
-    A stage that is not given is that of a service in order. ``asked``: the answer to the number of a message.
+    A stage that is omitted is that of a working service. ``answer`` maps the number of a message to its answer.
     """
 
     mode: str
     handshake: Callable[[], Parts] | None = None
     first: Callable[[], Parts] | None = None
-    asked: Callable[[int], Parts] | None = None
+    answer: Callable[[int], Parts] | None = None
     http: Callable[[], Parts] | None = None
 
 
@@ -105,7 +105,7 @@ ANSWERS: Final[Mapping[str, Kind]] = {
     "config a text": first("version", message_of(config="filters")),
     "status a list": first("version", message_of(status=[])),
     "status null": first("version", message_of(status=None)),
-    "400 digits": Kind("settings", asked=sent(frame(message_of(config=CONFIG | {"torque_scaling": 10**400})))),
+    "400 digits": Kind("settings", answer=sent(frame(message_of(config=CONFIG | {"torque_scaling": 10**400})))),
     "scale a list": http(b"[1]"),
     "scale of 400 digits": http(b"1" + b"0" * 400, "settings"),
     "redirected for ever": Kind("unknown-scale", http=sent(b"HTTP/1.1 302 Found\r\nLocation: /\r\n\r\n")),
@@ -119,10 +119,13 @@ HANGS: Final[Mapping[str, Kind]] = {
     "pongs flooded": Kind("no-reply", first=lambda: flooded(b"", frame(b"x" * 125, 0x8A))),
     "frame dripped": Kind("no-reply", first=lambda: dripped(b"\x81\x7e\xff\xffx")),
     "header cut": Kind("no-reply", first=sent(b"\x81\x7e\x10")),
-    "no answer": Kind("no-reply", asked=sent()),
-    "answers slowly": Kind("no-reply", asked=lambda _: slowly(0.2)),
-    "pings for an answer": Kind("no-reply", asked=lambda _: flooded(b"", frame(b"", 0x89))),
-    **{name: Kind("unknown-scale", http=partial(one, b"", None)) for name, one in STRANGERS.items() if "HTTP" in name},
+    "no answer": Kind("no-reply", answer=sent()),
+    "answers slowly": Kind("no-reply", answer=lambda _: slowly(0.2)),
+    "pings for an answer": Kind("no-reply", answer=lambda _: flooded(b"", frame(b"", 0x89))),
+    **{
+        name: Kind("unknown-scale", http=partial(respond, b"", None))
+        for name, respond in STRANGERS.items() if "HTTP" in name
+    },
 }  # fmt: skip
 
 
@@ -132,7 +135,7 @@ def slowly(pause_s: float) -> Parts:
 
 
 def answers(kind: Kind, head: bytes, connection: socket.socket) -> Parts:
-    """Yield what a service sends over a connection."""
+    """Yield the parts that a service sends over a connection."""
     if b"upgrade: websocket" not in head.lower():
         yield from kind.http() if kind.http else http(b'{"value": 1, "inverse3": []}').http()
         return
@@ -144,7 +147,7 @@ def answers(kind: Kind, head: bytes, connection: socket.socket) -> Parts:
     for number in itertools.count():
         if not connection.recv(1 << 16):
             return
-        yield from kind.asked(number) if kind.asked else [frame(message_of())]
+        yield from kind.answer(number) if kind.answer else [frame(message_of())]
 
 
 def test_data_in_a_message_are_cut_at_80_characters() -> None:
@@ -172,7 +175,7 @@ def test_every_kind_of_service_ends_in_its_failure_within_three_seconds(kind: Ki
         began_s = time.perf_counter()
         report = examine(f"inverse3:127.0.0.1:{port}", progress=str)
         assert time.perf_counter() - began_s < MOST_S
-        assert [one.id for one in report.found] == [kind.mode]
+        assert [finding.id for finding in report.found] == [kind.mode]
         assert report.failure is not None
         assert report.failure.isprintable()
         assert len(report.failure) < 450
@@ -182,7 +185,7 @@ def test_a_probe_of_a_service_that_hangs_ends_soon() -> None:
     def end(kind: Kind) -> tuple[float | None, bool, bool]:
         with serving(partial(answers, kind)) as port:
             began_s = time.perf_counter()
-            scale, why = force_scale("127.0.0.1", (port, port, port)), probe(ports=(port,)).why
+            scale, why = request_force_scale("127.0.0.1", (port, port, port)), probe(ports=(port,)).why
             return scale, "start Haply Hub" in why, time.perf_counter() - began_s < MOST_S
 
     kinds = {name: kind for name, kind in HANGS.items() if kind.http}
@@ -194,6 +197,6 @@ def test_a_probe_of_a_service_that_hangs_ends_soon() -> None:
 @pytest.mark.parametrize(
     "listed", ["5", "null", '{"a": 5}', "[5, null]", '[{"device_id": {"a": 1}}]', '[{"device_id": "a\\nb"}]']
 )
-def test_a_probe_of_a_list_that_is_none_finds_no_device(listed: str) -> None:
+def test_a_probe_of_an_invalid_list_finds_no_device(listed: str) -> None:
     with serving(partial(answers, http(b'{"inverse3": %b}' % listed.encode()))) as port:
         assert "does not list this Inverse3" in probe(ports=(port,)).why

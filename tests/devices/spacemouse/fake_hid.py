@@ -1,4 +1,4 @@
-"""hidapi with devices of a test."""
+"""A fake of hidapi with devices."""
 
 import threading
 from typing import Any
@@ -13,12 +13,12 @@ def interface(
     model: str = "SpaceNavigator", path: bytes = b"first", usage: tuple[int, int] | None = (1, 8)
 ) -> dict[str, Any]:
     known = MODEL[model]
-    told = {} if usage is None else {"usage_page": usage[0], "usage": usage[1]}
-    return {"vendor_id": known.vendor, "product_id": known.product, "path": path, **told}
+    usage_fields = {} if usage is None else {"usage_page": usage[0], "usage": usage[1]}
+    return {"vendor_id": known.vendor, "product_id": known.product, "path": path, **usage_fields}
 
 
 class FakeHid:
-    """hidapi with these devices connected; one that is opened reports what it is given, 8 ms apart."""
+    """A fake of hidapi with connected devices; an opened device sends given reports 8 ms apart."""
 
     def __init__(self, *reports: Any, listed: Any = None, opens: bool = True) -> None:
         self.reports = list(reports)
@@ -31,7 +31,7 @@ class FakeHid:
         self.idle, self.gone = threading.Event(), threading.Event()
 
     def say(self, report: bytes) -> None:
-        """Report this, and wait until it was read."""
+        """Send a report, and wait until it has been read."""
         self.idle.clear()
         self.reports.append(report)
         assert self.idle.wait(10)

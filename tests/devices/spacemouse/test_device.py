@@ -28,7 +28,7 @@ RIGHT = bytes([1, 0x5E, 0x01, 0, 0, 0, 0])  # 350 to the right
 REST = bytes([1, 0, 0, 0, 0, 0, 0])
 
 
-def opened(*reports, **options):
+def open_with_reports(*reports, **options):
     hid = FakeHid(*reports, **options)
     device = SpaceMouseDevice(hid=hid, now_s=hid.now_s)
     device.open()
@@ -52,7 +52,7 @@ class TestReports:
     @pytest.mark.parametrize(
         "report", [b"", b"\x01", b"\x01\x00\x00\x00\x00\x00", b"\x03", b"\x02" + bytes(6), b"\x17abc"]
     )
-    def test_rotation_half_reports_and_others_say_nothing(self, report):
+    def test_rotation_half_reports_and_other_reports_are_ignored(self, report):
         assert parse_report(report) is None
 
     @given(st.binary(max_size=64))
@@ -86,20 +86,20 @@ class TestReports:
             ("SpacePilot", 1 << 10, BUTTON_STOP),
         ],
     )
-    def test_every_model_can_stop_the_force_and_no_other_button_does(self, model, held, buttons):
+    def test_only_the_stop_buttons_of_each_model_stop_the_force(self, model, held, buttons):
         assert program_buttons(held, MODEL[model]) == buttons
 
 
 class TestMoving:
     def test_how_far_it_is_pushed_is_how_fast_it_goes(self):
-        device, _ = opened(RIGHT, *[RIGHT] * 12, REST, REST, REST)
+        device, _ = open_with_reports(RIGHT, *[RIGHT] * 12, REST, REST, REST)
         with device, Servo(device, clock=VirtualClock()) as servo:
             servo.advance(500)
             expected = 13 * HELD_S * FULL_SPEED_MPS
             assert servo.telemetry.latest().position_m == pytest.approx([expected, 0, 0], abs=2e-4)
 
     def test_it_does_not_leave_the_workspace_nor_remember_how_far_it_was_pushed_beyond(self):
-        device, hid = opened(*[RIGHT] * 100, bytes([1, 0xA2, 0xFE, 0, 0, 0, 0]), *[REST] * 2)
+        device, hid = open_with_reports(*[RIGHT] * 100, bytes([1, 0xA2, 0xFE, 0, 0, 0, 0]), *[REST] * 2)
         with device, Servo(device, clock=VirtualClock()) as servo:
             servo.advance(500)
             assert servo.telemetry.latest().position_m[0] == pytest.approx(0.05 - HELD_S * FULL_SPEED_MPS, abs=2e-4)
@@ -107,7 +107,7 @@ class TestMoving:
 
     def test_one_that_falls_silent_is_not_followed_for_ever(self):
         slow = bytes([1, 41, 0, 0, 0, 0, 0])
-        device, hid = opened(slow, *[b""] * 200, REST)
+        device, hid = open_with_reports(slow, *[b""] * 200, REST)
         with device, Servo(device, clock=VirtualClock()) as servo:
             servo.advance(500)
             went_m = 0.5 * velocity_mps(Displacement(right=41, toward=0, down=0))[0]
@@ -118,7 +118,7 @@ class TestMoving:
         """Half of the travel beyond the dead zone gives half the speed."""
         half = (350 - 20) // 2 + 20
         report = bytes([1, *(half).to_bytes(2, "little"), 0, 0, *(-350).to_bytes(2, "little", signed=True)])
-        device, hid = opened(report, REST)
+        device, hid = open_with_reports(report, REST)
         with device, Servo(device, clock=VirtualClock()) as servo:
             hid.say(bytes([1, 0, 0, 0x5E, 0x01, 0, 0]))
             hid.now += 0.4
@@ -130,7 +130,7 @@ class TestMoving:
             assert 0.0498 <= toward_m / FULL_SPEED_MPS <= 0.0502 + HELD_S, "and once more until the cap rests"
 
     def test_its_buttons_are_the_programs_until_it_is_opened_again(self):
-        device, hid = opened(bytes([3, 0b10, 0]), listed=[interface("SpaceMouse Pro")])
+        device, hid = open_with_reports(bytes([3, 0b10, 0]), listed=[interface("SpaceMouse Pro")])
         assert device.state.buttons == 0b10
         hid.say(bytes([3, 0b01, 0, 0x40, 0]))
         assert device.state.buttons == BUTTON_STOP | 0b01
@@ -142,12 +142,12 @@ class TestMoving:
         device.close()
 
     def test_a_model_without_a_light_is_sent_nothing(self):
-        device, hid = opened(listed=[interface("SpaceMouse (USB)")])
+        device, hid = open_with_reports(listed=[interface("SpaceMouse (USB)")])
         device.close()
         assert hid.written == []
 
     def test_its_light_is_on_while_it_is_used(self):
-        device, hid = opened()
+        device, hid = open_with_reports()
         assert hid.written == [b"\x04\x01"]
         device.close()
         assert hid.written[-1] == b"\x04\x00"
@@ -156,7 +156,7 @@ class TestMoving:
 
 
 class TestComingAndGoing:
-    def test_none_connected_is_told_with_those_there_are(self):
+    def test_a_missing_device_is_reported_with_the_supported_models(self):
         other = {"vendor_id": 0x046D, "product_id": 0xC52B, "path": b"a mouse", "usage_page": 1, "usage": 2}
         hid = FakeHid(listed=[other])
         assert find_space_mice(hid) == []
@@ -169,14 +169,14 @@ class TestComingAndGoing:
             interface("Universal Receiver", b"vendor", (0xFF00, 1)),
             interface("Universal Receiver", b"motion", (1, 8)),
         ]
-        device, hid = opened(listed=listed)
+        device, hid = open_with_reports(listed=listed)
         device.close()
         assert hid.path == b"motion"
         with pytest.raises(DeviceError, match=r"usage page 1, usage 8.*pair it"):
             SpaceMouseDevice(hid=FakeHid(listed=listed[:2])).open()
 
     def test_one_that_does_not_tell_its_usage_is_tried(self):
-        device, hid = opened(listed=[interface(path=b"silent", usage=None)])
+        device, hid = open_with_reports(listed=[interface(path=b"silent", usage=None)])
         device.close()
         assert hid.path == b"silent"
 
@@ -188,12 +188,12 @@ class TestComingAndGoing:
             ("win32", "close that program and 3DxWare"),
         ],
     )
-    def test_one_that_cannot_be_opened_says_what_to_do_on_this_system(self, platform, words, monkeypatch):
+    def test_a_refused_device_names_the_remedy_for_this_system(self, platform, words, monkeypatch):
         monkeypatch.setattr("sys.platform", platform)
         with pytest.raises(DeviceError, match=words):
             SpaceMouseDevice(hid=FakeHid(opens=False)).open()
 
-    def test_without_hidapi_it_says_what_to_install(self, monkeypatch):
+    def test_without_hidapi_the_error_names_the_package(self, monkeypatch):
         def missing(name):
             raise ImportError(f"no {name} here")
 
@@ -202,8 +202,8 @@ class TestComingAndGoing:
             SpaceMouseDevice().open()
 
 
-def test_the_receipt_says_which_it_was():
-    device, _ = opened(listed=[interface("SpaceMouse Pro")])
+def test_the_receipt_names_the_model():
+    device, _ = open_with_reports(listed=[interface("SpaceMouse Pro")])
     described = device.describe()
     device.close()
     assert described["name"] == "spacemouse"

@@ -31,11 +31,11 @@ def test_a_motion_file_of_another_rate_is_brought_to_the_scenes(tmp_path, monkey
     rows = "\n".join(f"{k / 50},{k / 100},0,0" for k in range(21))
     (tmp_path / "slow.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8", newline="\n")
     measured = []
-    monkeypatch.setattr("study_app.evidence.accuracy.accuracy", lambda *given, **_: measured.append(given))
+    monkeypatch.setattr("study_app.evidence.accuracy.accuracy", lambda *arguments, **_: measured.append(arguments))
     monkeypatch.setattr("study_app.evidence.accuracy.accuracy_evidence", lambda _found: Evidence("", {}))
     words = ["accuracy", "rek2024", "--liquid", "water", "--path", str(tmp_path / "slow.csv"), "--to", str(tmp_path)]
-    done = CliRunner().invoke(commands, words)
-    assert done.exit_code == 0, done.output
+    result = CliRunner().invoke(commands, words)
+    assert result.exit_code == 0, result.output
     ((_, _, read, *_),) = measured
     assert read.t_s == pytest.approx(np.arange(401) / 1000)
     assert read.position_m[:, 0] == pytest.approx(read.t_s / 2)
@@ -45,7 +45,7 @@ CHOSEN = ("water", "honey", "olive_oil")
 
 
 @pytest.fixture(scope="module")
-def found():
+def survey():
     scenes = load_scenes("physical2")
     return {it.liquid: it for it in survey_scenes({name: scenes[name] for name in CHOSEN})}
 
@@ -61,9 +61,9 @@ def test_a_published_law_is_stokes_drag_at_rest_and_a_spheres_at_its_end(name):
 
 
 @compiled
-def test_each_liquid_is_compared_with_what_is_known_of_it(found):
-    assert list(found) == ["honey", "olive_oil", "water"]
-    honey, oil, water = found.values()
+def test_each_liquid_is_compared_with_its_references(survey):
+    assert list(survey) == ["honey", "olive_oil", "water"]
+    honey, oil, water = survey.values()
     assert (honey.model, oil.model, water.model) == ("unsteady drag", "unsteady drag", "constant C_d + added mass")
     assert max(honey.creeping, oil.creeping) < 0.01
     assert 0 < honey.solver < 0.04
@@ -72,13 +72,13 @@ def test_each_liquid_is_compared_with_what_is_known_of_it(found):
     assert honey.solver_reynolds[1] == pytest.approx(honey.reynolds, rel=1e-3)
     assert (oil.solver, water.solver, water.creeping) == (None, None, None)
     assert water.reynolds == pytest.approx(998.2 * 0.6 * 0.068 / 1.0016e-3, rel=1e-3)
-    for it in found.values():
+    for it in survey.values():
         assert it.expected.causes.law < 0.08
         assert 0.04 < it.expected.error_share < 0.16 + it.expected.causes.limits
         assert it.expected.cost_ns > 0
 
 
-def surveyed(name: str, model: str, **keys: Any) -> Surveyed:
+def made_up_survey(name: str, model: str, **keys: Any) -> Surveyed:
     """Return a liquid with 2 m/s at a Reynolds number of 40, and an own value for each column."""
     expected: Any = SimpleNamespace(causes=SimpleNamespace(law=0.021), error_share=0.173, cost_ns=187.4)
     values: dict[str, Any] = {"creeping": 0.011, "steady": 0.12, "solver": 0.034, "solver_reynolds": (1.5, 27.0)}
@@ -88,8 +88,10 @@ def surveyed(name: str, model: str, **keys: Any) -> Surveyed:
 
 
 def test_each_column_of_the_survey_has_its_own_value() -> None:
-    thick = surveyed("syrup", "unsteady drag")
-    thin = surveyed("water", "drag", creeping=None, steady=None, solver=None, solver_reynolds=(math.nan, math.nan))
+    thick = made_up_survey("syrup", "unsteady drag")
+    thin = made_up_survey(
+        "water", "drag", creeping=None, steady=None, solver=None, solver_reynolds=(math.nan, math.nan)
+    )
     lines = [line.split(" | ") for line in survey_evidence((thick, thin)).text.splitlines() if line.startswith("| ")]
     ratios = [law(40.0) for law in PUBLISHED.values()]
     spread = f"{100 * (max(ratios) - min(ratios)) / np.mean(ratios):.2g} %"

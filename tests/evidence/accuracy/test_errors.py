@@ -67,9 +67,9 @@ def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal()
 def test_each_estimator_is_drawn_at_its_time_and_errors_with_their_axes_named() -> None:
     errors = [("ewma", 1, 21.0, 40.0, 11.0), ("ewma", 3, 25.0, 90.0, 30.0), ("kalman", 2, 63.0, 17.0, 13.0)]
     acting = tuple(ActingError(*row) for row in errors)
-    found = Accuracy(rows=(), truths=(), notes=(), machine="", motion="", acting=acting, acting_liquid="Water")
+    table = Accuracy(rows=(), truths=(), notes=(), machine="", motion="", acting=acting, acting_liquid="Water")
     figure = Figure(figsize=(6, 4))
-    accuracy_report._draw_acting(figure, found, 288.0)
+    accuracy_report._draw_acting(figure, table, 288.0)
     (axes,) = figure.axes
     assert (axes.get_xlabel(), axes.get_title()) == ("Computation time per tick [ns]", "Error [% of the force]")
     places = [tuple(part.get_offsets()[0]) for part in axes.collections]

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 
 @compiled
-def test_with_a_given_velocity_the_limits_alone_cause_an_error():
+def test_with_a_given_velocity_only_the_limits_cause_an_error():
     known = expected(TANK.model_copy(update={"velocity": Given()}))
     assert known.error_share == pytest.approx(known.causes.limits, abs=1e-10)
     assert known.error_share > 0.01
@@ -34,7 +34,7 @@ def test_an_exact_model_with_the_true_velocity_is_expected_to_be_right():
 
 
 @compiled
-def test_what_a_scene_leaves_out_is_expected_to_be_missing():
+def test_omitted_effects_appear_in_the_expected_error():
     named = HONEY.model_copy(update={"effects": ("drag",), "drag": Drag(law="haider-levenspiel")})
     lacking = expected(REAL.model_copy(update={"liquids": (named,)}))
     whole = expected(REAL)
@@ -47,13 +47,13 @@ def test_what_a_scene_leaves_out_is_expected_to_be_missing():
 
 
 @compiled
-def test_the_error_is_split_by_what_causes_it():
+def test_the_error_is_split_by_cause():
     """EWMA lags in velocity; behind a Kalman filter the smoothing of dw/dt lags; each limit takes its part alone."""
 
     def causes(delay=1, **changes):
-        found = expected(REAL.model_copy(update={"velocity": Kalman(), **changes}), delay)
-        assert found.error_share < sum(found.causes) + 1e-12
-        return found.causes
+        expected_error = expected(REAL.model_copy(update={"velocity": Kalman(), **changes}), delay)
+        assert expected_error.error_share < sum(expected_error.causes) + 1e-12
+        return expected_error.causes
 
     kalman, ewma, known = (causes(velocity=it) for it in (Kalman(), Ewma(), Given()))
     assert kalman.acceleration > 2 * kalman.velocity > 0
@@ -68,7 +68,7 @@ def test_the_error_is_split_by_what_causes_it():
     assert (weak.acceleration, weak.law) == (kalman.acceleration, kalman.law)
 
 
-def test_the_force_of_a_slow_stroke_is_that_of_creeping_flow():
+def test_the_force_of_a_slow_stroke_equals_that_of_creeping_flow():
     """Far below Re 1 the drag by experiments is Stokes', within their scatter, and the rest is exact."""
     omega, v = 10.0, 1e-3
     t_s = stroke_motion(v, omega, 1, 1000).t_s

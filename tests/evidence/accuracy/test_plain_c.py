@@ -27,9 +27,9 @@ def test_plain_c_computes_the_forces_of_the_servo():
         "short": tank(length=1, scaling=2.5),
         "turning": tank(breaking_span_m=1.0),
     }
-    for name, found in compare_with_plain_c(scenes, batches=5).items():
-        assert found.difference < 1e-9, name
-        assert 0 < found.plain_ns < found.tick_ns, name
+    for name, comparison in compare_with_plain_c(scenes, batches=5).items():
+        assert comparison.difference < 1e-9, name
+        assert 0 < comparison.plain_ns < comparison.tick_ns, name
 
 
 @needs_gcc

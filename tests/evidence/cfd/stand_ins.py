@@ -14,5 +14,5 @@ def linear_table(case: Case, grid: Any, coarse: Any) -> bytes:
 
 
 def steady() -> bytes:
-    """Return what stands for the table of steady drag."""
+    """Return a replacement of the table of steady drag."""
     return b"steady"

@@ -1,4 +1,4 @@
-"""The fluid solver: its motion and exact linear force, what is stored of it, the fits to that, and a coarse flow."""
+"""The fluid solver: its motion and exact linear force, its stored tables, the fits to them, and a coarse flow."""
 
 import csv
 import re
@@ -38,8 +38,8 @@ def stored():
 
 @pytest.fixture(scope="module")
 def fits(stored):
-    """Return the stored fits, judged anew by the tables; nothing is fitted."""
-    models, found = {it.name: it for it in fitted.MODELS}, []
+    """Return the stored fits, evaluated again on the tables without fitting."""
+    models, judged = {it.name: it for it in fitted.MODELS}, []
     for row in csv.DictReader((PACKAGE / fitted.FITS_FILE).read_text("utf-8").splitlines()):
         table = stored[row["table"]]
         values = {name: float(value) for name, _, value in (it.partition("=") for it in row["parameters"].split())}
@@ -49,13 +49,13 @@ def fits(stored):
             for it in (stored[name] for name in NAMES)
             if it.case.liquid_id == table.case.liquid_id and it is not table
         ]
-        found.append(fitted.evaluate_fit(models[row["model"]], table, values, others))
-    return tuple(found)
+        judged.append(fitted.evaluate_fit(models[row["model"]], table, values, others))
+    return tuple(judged)
 
 
-def of(fits, name, model):
-    (found,) = [it for it in fits if it.case.name == name and it.model.name == model]
-    return found
+def fit_of(fits, name, model):
+    (matching_fit,) = [it for it in fits if it.case.name == name and it.model.name == model]
+    return matching_fit
 
 
 # --- The motion and the exact force ---
@@ -73,7 +73,7 @@ def test_acceleration_is_the_slope_of_the_speed_which_begins_at_rest(profile):
 @pytest.mark.parametrize("t", [0.05, 0.2, 0.3, 5.0, 10.1, 10.2, 12.0])
 @pytest.mark.parametrize("reynolds", [1.0, 100.0])
 @pytest.mark.parametrize("profile", PROFILES.values(), ids=PROFILES)
-def test_the_exact_linear_force_is_what_plain_quadrature_gives(profile, t, reynolds):
+def test_the_exact_linear_force_equals_plain_quadrature(profile, t, reynolds):
     def acceleration(tau):
         return float(profile.acceleration(np.array(tau)))
 
@@ -89,7 +89,7 @@ def test_the_exact_linear_force_is_what_plain_quadrature_gives(profile, t, reyno
     assert profile.linear_drags(np.array([t]), reynolds) == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
-def test_what_is_not_axisymmetric_is_refused():
+def test_flows_that_are_not_axisymmetric_are_refused():
     with pytest.raises(StudyError, match="Reynolds number of 241"):
         Case(
             liquid_id="water",
@@ -104,7 +104,7 @@ def test_what_is_not_axisymmetric_is_refused():
 
 
 @pytest.mark.parametrize("expected", CASES, ids=lambda it: it.name)
-def test_a_table_is_of_the_shipped_liquid_and_says_what_made_it(stored, expected):
+def test_a_table_describes_the_shipped_liquid_and_its_origin(stored, expected):
     table = stored[expected.name]
     assert (table.case.liquid_id, table.case.profile) == (expected.liquid_id, expected.profile)
     for field in ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps"):
@@ -120,7 +120,7 @@ def test_a_table_is_of_the_shipped_liquid_and_says_what_made_it(stored, expected
         assert elsewhere < 0.2, check
 
 
-def test_steady_drag_is_what_was_published_and_independent_of_the_grid():
+def test_steady_drag_equals_published_values_and_is_independent_of_the_grid():
     reynolds, drag, coarse, narrow = stored_flows.load_steady().columns.values()
     np.testing.assert_allclose(coarse, drag, rtol=4e-3)
     np.testing.assert_allclose(narrow, drag, rtol=2e-3)
@@ -145,7 +145,7 @@ t_s,velocity_mps,force_n
 """
 
 
-def test_a_stored_table_is_taken_for_its_own_liquid_alone(tmp_path):
+def test_a_stored_table_is_used_only_for_its_own_liquid(tmp_path):
     honey, glycerin = (load_scene("physical_liquids", name) for name in ("honey", "glycerin"))
     (tmp_path / "start-100mmps.csv").write_text(TABLE, encoding="utf-8", newline="\n")
     (tmp_path / "steady.csv").write_text("reynolds,drag_coefficient\n1,27\n", encoding="utf-8", newline="\n")
@@ -183,7 +183,7 @@ def test_the_stored_fits_have_the_errors_they_say(fits):
     for row, other in zip(rows, said, strict=True):
         assert row.split(",")[:2] == other.split(",")[:2]
         if not row.startswith("table"):
-            ours, theirs = (np.array([float(it) for it in one.rsplit(",", 6)[1:]]) for one in (row, other))
+            ours, theirs = (np.array([float(it) for it in line.rsplit(",", 6)[1:]]) for line in (row, other))
             np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-4, err_msg=other)
 
 
@@ -191,13 +191,13 @@ def test_the_stored_fits_have_the_errors_they_say(fits):
 def test_a_fit_made_again_is_the_stored_one(stored, fits):
     (model,) = [it for it in fitted.MODELS if it.free == ("coefficient",)]
     values, _ = fitted.fit_one(model, stored["glycerin-600mmps"])
-    assert values == pytest.approx(of(fits, "glycerin-600mmps", model.name).values, rel=1e-3)
+    assert values == pytest.approx(fit_of(fits, "glycerin-600mmps", model.name).values, rel=1e-3)
 
 
 # --- The solver ---
 
 
-def test_without_the_library_one_line_says_what_to_install(monkeypatch, tmp_path):
+def test_without_the_library_the_error_names_the_package(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "ngsolve", None)
     finished = CliRunner().invoke(commands, ["cfd", "--solve", "--to", str(tmp_path / "new")])
     assert isinstance(finished.exception, StudyError)
@@ -248,7 +248,7 @@ def test_a_coarse_flow_resists_as_it_should(coarse):
     assert fast == pytest.approx(fitted.clift(50.0), rel=0.02)
 
 
-def test_a_solution_that_misses_the_coarse_one_is_not_stored(coarse, monkeypatch):
+def test_a_solution_that_differs_from_the_coarse_one_is_not_stored(coarse, monkeypatch):
     monkeypatch.setattr(solver, "PERMITTED", 1e-6)
     with pytest.raises(StudyError, match=r"differs from the coarse solution .* nothing was stored"):
         solver.motion_table(solved_cases.cases()[0], coarse, coarse, step=0.025)

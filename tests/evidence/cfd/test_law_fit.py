@@ -1,4 +1,4 @@
-"""The constants of unsteady drag: those of the program are what the command fits to the stored motions."""
+"""The constants of unsteady drag: the program has those that the command fits to the stored motions."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="thousan
 PLANTED = Constants(c_m=0.5, c_y=1.4, c_z=5.0, c_s=1.5, beta=2.0, r_0=8.0)
 
 
-def test_the_programs_constants_are_those_of_the_letter():
+def test_the_programs_constants_equal_the_reference_constants():
     names = ("MEMORY_LOSS", "EXCESS_GAIN", "WAKE_GAIN", "FAR_WAKE_GAIN", "OVERTAKING", "OVERTAKING_REYNOLDS")
     assert tuple(getattr(unsteady_drag, name) for name in names) == tuple(CONSTANTS)
 
@@ -27,7 +27,7 @@ def test_a_fit_to_the_stored_motions_gives_the_programs_constants_within_half_a_
     assert tuple(fitted) == pytest.approx(tuple(CONSTANTS), rel=5e-3)
 
 
-def planted(table):
+def planted_motion(table):
     """Return the motion of a table with the force of the law with other constants."""
     case = table.case
     liquid = Liquid(
@@ -43,13 +43,13 @@ def planted(table):
 
 
 def test_planted_constants_are_found_and_a_motion_left_out_is_met():
-    tables = [planted(it) for it in stored_flows.training() if it.case.liquid_id == "gear_oil"]
-    found = law_fit.refit_law(tables)
-    assert tuple(found.constants) == pytest.approx(tuple(PLANTED), rel=1e-3)
-    assert max(max(it.fitted) for it in found.errors) < 1e-4
-    assert max(it.left_out[0] for it in found.errors) < 0.02
-    assert min(it.program[0] for it in found.errors) > 0.01
-    text = law_fit.law_fit_evidence(found).text
+    tables = [planted_motion(it) for it in stored_flows.training() if it.case.liquid_id == "gear_oil"]
+    refit = law_fit.refit_law(tables)
+    assert tuple(refit.constants) == pytest.approx(tuple(PLANTED), rel=1e-3)
+    assert max(max(it.fitted) for it in refit.errors) < 1e-4
+    assert max(it.left_out[0] for it in refit.errors) < 0.02
+    assert min(it.program[0] for it in refit.errors) > 0.01
+    text = law_fit.law_fit_evidence(refit).text
     assert "| c_z | 5 | 3.15 |" in text
     assert text.count("gear_oil | ") == len(tables)
 
@@ -68,9 +68,9 @@ def test_the_program_meets_motions_that_no_fit_used():
 @pytest.mark.timeout(900)
 def test_each_motion_left_out_of_the_fit_is_met():
     """Within 5.1 %; motions that no fit uses within 6 %, but for the reversal at Re 100."""
-    done = CliRunner().invoke(commands, ["cfd", "--refit"])
-    assert done.exit_code == 0, done.output
-    rows = [line.split(" | ") for line in done.stdout.splitlines() if "m/s |" in line]
+    result = CliRunner().invoke(commands, ["cfd", "--refit"])
+    assert result.exit_code == 0, result.output
+    rows = [line.split(" | ") for line in result.stdout.splitlines() if "m/s |" in line]
     assert len(rows) == sum(map(len, (stored_flows.training(), stored_flows.load_tables(), stored_flows.held_out())))
     assert sum(row[3] == "held out" for row in rows) == len(stored_flows.held_out())
     held_out = {row[0].strip("| "): float(row[4].split("%")[0]) for row in rows if row[3] == "held out"}

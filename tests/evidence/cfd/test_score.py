@@ -39,7 +39,7 @@ def damper(damping_nspm, _setup):
 
 @pytest.fixture
 def alone(tmp_path: Path) -> Path:
-    """The scorer as somebody downloads it, with one table."""
+    """Return a folder with the downloaded scorer and one table."""
     (tmp_path / "held_out").mkdir()
     for name in ("score.py", "SHA256SUMS", f"held_out/{NAME}.csv"):
         shutil.copy(SCORE.parent / name, tmp_path / name)
@@ -53,15 +53,15 @@ def test_a_program_over_a_pipe_and_a_function_get_the_same_score(alone: Path) ->
     scores, let = score.measure(stokes, [motion])
     expected = score.row("", scores, let)
     words = [sys.executable, "-I", "score.py", sys.executable, "stokes.py"]
-    done = subprocess.run(words, cwd=alone, capture_output=True, text=True, check=False, timeout=120)
-    assert (done.returncode, done.stderr.splitlines()) == (0, [f"{NAME} ...", "released handles in honey ..."])
-    cells = [cell.strip() for cell in done.stdout.splitlines()[-1].split("|")[2:-1]]
+    process = subprocess.run(words, cwd=alone, capture_output=True, text=True, check=False, timeout=120)
+    assert (process.returncode, process.stderr.splitlines()) == (0, [f"{NAME} ...", "released handles in honey ..."])
+    cells = [cell.strip() for cell in process.stdout.splitlines()[-1].split("|")[2:-1]]
     assert cells[:3] + cells[4:] == expected[1:4] + expected[5:]
-    assert f"| {NAME} | 2 | no | {scores[0].rms:.1%} | {scores[0].greatest:.1%} |" in done.stdout
+    assert f"| {NAME} | 2 | no | {scores[0].rms:.1%} | {scores[0].greatest:.1%} |" in process.stdout
     assert let[0].delay == 8
 
 
-def test_the_scorer_needs_numpy_alone() -> None:
+def test_the_scorer_needs_only_numpy() -> None:
     imports = [
         node for node in ast.walk(ast.parse(SCORE.read_text("utf-8"))) if isinstance(node, ast.Import | ast.ImportFrom)
     ]
@@ -72,14 +72,14 @@ def test_the_scorer_needs_numpy_alone() -> None:
 @pytest.mark.parametrize(("name", "held_out"), [(NAME, True), ("glycerin-600mmps", False)])
 def test_a_law_alone_has_the_error_that_its_fit_reports(name: str, held_out: bool) -> None:
     (motion,) = [it for it in score.motions(only=name) if it.name == name]
-    found = score.score(partial(fits.Tick, "unsteady drag", sent=False), motion)
+    scored = score.score(partial(fits.Tick, "unsteady drag", sent=False), motion)
     (table,) = [
         it for it in (stored_flows.held_out() if held_out else stored_flows.load_tables()) if it.case.name == name
     ]
     judged = fits.evaluate_fit(fits.MODELS[-1], table, {})
     assert motion.fitted is not held_out
-    assert found.rms == pytest.approx(judged.share, rel=1e-6)
-    assert found.greatest == pytest.approx(judged.worst_n / np.abs(table.columns["force_n"]).max(), rel=1e-3)
+    assert scored.rms == pytest.approx(judged.share, rel=1e-6)
+    assert scored.greatest == pytest.approx(judged.worst_n / np.abs(table.columns["force_n"]).max(), rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -92,16 +92,16 @@ def test_a_law_alone_has_the_error_that_its_fit_reports(name: str, held_out: boo
     ],
 )
 def test_the_delay_borne_is_the_one_of_theory(damping_nspm: float, delay: int) -> None:
-    found = score.releases(partial(damper, damping_nspm), score.motions(only=NAME)[0])
-    assert found.delay == delay
-    assert (found.given_j > 1e-3) == (damping_nspm < 0)
+    release = score.releases(partial(damper, damping_nspm), score.motions(only=NAME)[0])
+    assert release.delay == delay
+    assert (release.given_j > 1e-3) == (damping_nspm < 0)
 
 
-def test_a_force_that_is_no_number_while_the_hand_moves_is_no_delay_borne() -> None:
-    found = score.releases(
+def test_a_non_finite_force_during_motion_counts_as_no_tolerated_delay() -> None:
+    release = score.releases(
         lambda _setup: lambda t_s, _x_m, v_mps: math.nan if t_s == 0.1 else -v_mps, score.motions(only=NAME)[0]
     )
-    assert (found.given_j, found.delay) == (math.inf, -1)
+    assert (release.given_j, release.delay) == (math.inf, -1)
 
 
 @pytest.mark.slow
@@ -118,7 +118,7 @@ def test_the_models_of_the_program_are_scored_with_times_as_multiples_of_the_fir
 
 
 @pytest.mark.slow
-def test_the_safety_layer_bears_delays_that_the_law_alone_does_not() -> None:
+def test_the_safety_layer_tolerates_delays_that_the_law_alone_does_not() -> None:
     motion = score.motions(only=NAME)[0]
     alone, sent = (
         score.releases(partial(fits.Tick, "unsteady drag", sent=sent), motion, (0, 1, 2)) for sent in (False, True)

@@ -26,7 +26,7 @@ def test_the_solution_depends_little_on_grid_and_smoothing():
         assert np.abs(table[name] / table["drag"] - 1).max() <= most
 
 
-def test_the_command_writes_what_it_prints(tmp_path):
+def test_the_command_writes_the_text_that_it_prints(tmp_path):
     printed = CliRunner().invoke(commands, ["cfd", "--materials"], catch_exceptions=False).output
     written = CliRunner().invoke(commands, ["cfd", "--materials", "--to", str(tmp_path)], catch_exceptions=False)
     assert (tmp_path / "materials.md").read_text("utf-8") == printed

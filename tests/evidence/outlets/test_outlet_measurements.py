@@ -19,15 +19,15 @@ slow = pytest.mark.slow
 @needs_servo
 @pytest.mark.parametrize("seconds", [pytest.param(3, marks=slow), pytest.param(60, marks=[slow, pytest.mark.nightly])])
 def test_every_sample_and_marker_arrives_with_the_servos_time(seconds: int) -> None:
-    found = measure_streams(seconds, ending=threading.Event())
-    assert found.samples_sent > 500 * seconds
-    assert (found.samples_lost, found.intact) == (0, True)
-    assert found.markers_sent > 10 * seconds
-    assert found.markers_lost == 0
-    assert len(found.errors_us) == found.markers_sent
-    assert found.error_p99_ms <= 1.0
-    assert found.arrivals_ms.min() > -1.0
-    assert found.met
+    measured = measure_streams(seconds, ending=threading.Event())
+    assert measured.samples_sent > 500 * seconds
+    assert (measured.samples_lost, measured.intact) == (0, True)
+    assert measured.markers_sent > 10 * seconds
+    assert measured.markers_lost == 0
+    assert len(measured.errors_us) == measured.markers_sent
+    assert measured.error_p99_ms <= 1.0
+    assert measured.arrivals_ms.min() > -1.0
+    assert measured.met
 
 
 @pytest.mark.nightly
@@ -35,14 +35,14 @@ def test_every_sample_and_marker_arrives_with_the_servos_time(seconds: int) -> N
 @slow
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no virtual ports")
 def test_each_event_is_one_byte_at_a_reader_of_a_virtual_port() -> None:
-    found = triggers.measure_triggers(triggers.VIRTUAL, 1.0, ending=threading.Event())
-    assert found.read_us is not None
-    assert found.high_ms is not None
-    assert len(found.read_us) == len(found.written_us) >= 5
-    assert found.wrong == 0
-    assert found.read_us.min() > 0
-    assert np.median(found.high_ms) >= 9.0
-    assert "wrong or missing bytes: 0" in triggers.triggers_evidence(found).text
+    measured = triggers.measure_triggers(triggers.VIRTUAL, 1.0, ending=threading.Event())
+    assert measured.read_us is not None
+    assert measured.high_ms is not None
+    assert len(measured.read_us) == len(measured.written_us) >= 5
+    assert measured.wrong == 0
+    assert measured.read_us.min() > 0
+    assert np.median(measured.high_ms) >= 9.0
+    assert "wrong or missing bytes: 0" in triggers.triggers_evidence(measured).text
 
 
 def test_a_port_that_is_not_there_is_named() -> None:

@@ -36,10 +36,10 @@ from study_app.protocol.simulated import TrialFeatures
 
 @pytest.fixture(scope="module")
 def rek() -> Plan:
-    """The thesis' study as if each liquid had its own force, without any rehearsal."""
+    """Return the plan of the thesis' study with a made-up force for each liquid, without a rehearsal."""
     protocol = load("rek2024")
     force_n = {"water": 0.3, "honey": 1.2, "light_oil": 0.6}
-    felt = {
+    features = {
         (block.id, name): (
             TrialFeatures(
                 force_mean_n=force_n.get(name, 0.3),
@@ -53,22 +53,22 @@ def rek() -> Plan:
         for block in protocol.main_blocks
         for name in block.conditions
     }
-    return plan(protocol, felt)
+    return plan(protocol, features)
 
 
 def test_each_generator_answers_in_its_own_way(rek: Plan) -> None:
-    one, other = (simulate_answers(rek, generator, "full", 20, 3, 1) for generator in GENERATORS)
-    assert all((first != second).any() for first, second in zip(one, other, strict=True))
+    answers, other_answers = (simulate_answers(rek, generator, "full", 20, 3, 1) for generator in GENERATORS)
+    assert all((first != second).any() for first, second in zip(answers, other_answers, strict=True))
 
 
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("participants", [5, 15])
-def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participants: int) -> None:
+def test_quick_verdicts_equal_those_of_the_whole_evaluation(rek: Plan, participants: int) -> None:
     people = tuple(f"P{number}" for number in range(participants))
     for extent in EXTENTS:
-        given = simulate_answers(rek, "ordinal probit", extent, participants, 5, 2)
-        for block, values in zip(rek.blocks, given, strict=True):
+        answers = simulate_answers(rek, "ordinal probit", extent, participants, 5, 2)
+        for block, values in zip(rek.blocks, answers, strict=True):
             single_ = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
             whole, quick = (
                 evaluate_block(
@@ -76,15 +76,15 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participant
                 )
                 for verdicts_only in (False, True)
             )
-            assert [one.verdict for one in ContrastsWithControl.value_in(quick)] == [
-                one.verdict for one in ContrastsWithControl.value_in(whole)
+            assert [contrast.verdict for contrast in ContrastsWithControl.value_in(quick)] == [
+                contrast.verdict for contrast in ContrastsWithControl.value_in(whole)
             ]
             assert (SettingsDiffer.value_in(quick), Pairs.value_in(quick)) == (
                 SettingsDiffer.value_in(whole),
                 Pairs.value_in(whole),
             )
-            assert [one.p_adjusted for one in DelayTrend.value_in(quick)] == [
-                one.p_adjusted for one in DelayTrend.value_in(whole)
+            assert [step.p_adjusted for step in DelayTrend.value_in(quick)] == [
+                step.p_adjusted for step in DelayTrend.value_in(whole)
             ]
             assert (LowestDelay.value_in(quick), DetectionThreshold.value_in(quick), MeanTests.value_in(quick)) == (
                 LowestDelay.value_in(whole),
@@ -92,7 +92,7 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participant
                 MeanTests.value_in(whole),
             )
             recognised = LiquidRecognition.value_in(whole), LiquidRecognition.value_in(quick)
-            assert len({None if one is None else (one.verdict, one.found.p) for one in recognised}) == 1
+            assert len({None if result is None else (result.verdict, result.found.p) for result in recognised}) == 1
 
 
 @pytest.mark.slow
@@ -107,7 +107,7 @@ def test_every_kind_of_study_is_counted(rek: Plan, generator: Generator, monkeyp
     assert sum(rate.what == CLAIMED for rate in rates) == 3
     assert not [rate for rate in rates if rate.limit == "at most 5 %" and rate.hits == 2]
     assert {"detection threshold printed (delays)", "equal liquids distinguished (liquids)"} <= {
-        one.what for one in rates
+        rate.what for rate in rates
     }
     assert rates == [rate for cell in cells for rate in count_studies(rek, cell, true_effects(rek, cell), 1, 0, 2)]
     files = report_rates_evidence(rates, "rates").files
@@ -121,18 +121,22 @@ def test_every_kind_of_study_is_counted(rek: Plan, generator: Generator, monkeyp
 def test_another_estimator_of_noticed_delays_and_other_intervals_are_noticed(
     factor: float, reach: float, what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def other(*given: Any) -> Threshold:
-        found = detection_threshold(*given)
-        if found.interval is None or found.effect is None:
-            return found
-        ends = [factor * (found.effect + reach * (end - found.effect)) for end in (found.lower, found.upper) if end]
+    def other(*arguments: Any) -> Threshold:
+        original = detection_threshold(*arguments)
+        if original.interval is None or original.effect is None:
+            return original
+        ends = [
+            factor * (original.effect + reach * (end - original.effect))
+            for end in (original.lower, original.upper)
+            if end
+        ]
         low, high = ends
-        return replace(found, interval=Interval(low=low, high=high, level=0.95, method="other"))
+        return replace(original, interval=Interval(low=low, high=high, level=0.95, method="other"))
 
     monkeypatch.setattr(studies, "detection_threshold", other)
     rates = count_single(("the same threshold for all", 12), 1, 0, 150 if reach == 1 else 800)
-    assert [one.holds for one in rates if one.what == what] == ["no"] * bool(what)
-    assert what or "no" not in [one.holds for one in rates]
+    assert [rate.holds for rate in rates if rate.what == what] == ["no"] * bool(what)
+    assert what or "no" not in [rate.holds for rate in rates]
 
 
 @pytest.mark.slow

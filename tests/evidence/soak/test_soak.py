@@ -1,4 +1,4 @@
-"""The soak: sound where the servo is, and the command that runs it."""
+"""The soak test: it passes with a sound servo; and its command."""
 
 import json
 import signal
@@ -33,32 +33,34 @@ def scenes():
 
 
 @pytest.fixture(scope="module")
-def found(scenes):
+def report(scenes):
     """Return the report of two minutes in virtual time."""
     return soak_servo(scenes, SHORT_H, virtual=True)
 
 
-def test_two_virtual_minutes_of_every_fault_find_nothing(found):
-    assert found.findings == ()
-    assert found.verdict == "passed: no faults found"
-    assert found.ticks == found.planned == 120_000
-    for name, times, readings, seen in found.faults:
-        assert 0 < times <= readings == seen, name
-    assert found.recoveries == sum(times for name, times, _, _ in found.faults if "lost" in name) + found.counts.stale
-    assert found.counts.stale > 0
-    assert found.rests.count == 4
-    assert 1 < found.rests.pushed_s < 3.5, "the wake of water pushes for 1.7 s"
-    assert found.drift.comparisons > 20
-    assert 5 < found.drift.longest_s < 30
-    assert 1 < found.device.most_n <= 8
-    assert not found.device.last_n.any()
-    assert found.dropped == 0
-    assert len(found.memory) == 11
+def test_two_virtual_minutes_of_every_fault_find_nothing(report):
+    assert report.findings == ()
+    assert report.verdict == "passed: no faults found"
+    assert report.ticks == report.planned == 120_000
+    for name, times, readings, count_seen in report.faults:
+        assert 0 < times <= readings == count_seen, name
+    assert (
+        report.recoveries == sum(times for name, times, _, _ in report.faults if "lost" in name) + report.counts.stale
+    )
+    assert report.counts.stale > 0
+    assert report.rests.count == 4
+    assert 1 < report.rests.pushed_s < 3.5, "the wake of water pushes for 1.7 s"
+    assert report.drift.comparisons > 20
+    assert 5 < report.drift.longest_s < 30
+    assert 1 < report.device.most_n <= 8
+    assert not report.device.last_n.any()
+    assert report.dropped == 0
+    assert len(report.memory) == 11
 
 
-def test_each_number_of_the_report_stands_beside_its_own_name(found):
-    """Every number is another one."""
-    counts, device, mib = found.counts.copy(), found.device.copy(), 2**20
+def test_each_number_of_the_report_stands_beside_its_own_name(report):
+    """Every number differs from the others."""
+    counts, device, mib = report.counts.copy(), report.device.copy(), 2**20
     for name, number in {
         "limit_n": 8.0, "steepest_n": 1.2, "release_step_n": 1.1, "energy_step_n": 0.3, "no_number": 4, "refused": 15,
         "stale": 1600, "drift_ns": 17, "latest_s": 0.018, "limiters": 30 + np.arange(len(LIMITER_NAMES)),
@@ -70,14 +72,14 @@ def test_each_number_of_the_report_stands_beside_its_own_name(found):
         "most_n": 1.9, "writes": 2000, "not_finite": 21, "episodes": 50 + np.arange(7), "injected": 70 + np.arange(7),
     }.items():  # fmt: skip
         device[name] = number
-    report = replace(
-        found, counts=counts, device=device, overruns=22, dropped=23, recoveries=24, loads=25, stops=26,
-        memory=(mib, 2 * mib, 7 * mib // 2), drift=replace(found.drift, comparisons=27, worst=2.8e-10, longest_s=29.0),
-        rests=replace(found.rests, count=61, pushed_s=0.62, wake_mps=0.63, force_n=0.64),
+    numbered = replace(
+        report, counts=counts, device=device, overruns=22, dropped=23, recoveries=24, loads=25, stops=26,
+        memory=(mib, 2 * mib, 7 * mib // 2), drift=replace(report.drift, comparisons=27, worst=2.8e-10, longest_s=29.0),
+        rests=replace(report.rests, count=61, pushed_s=0.62, wake_mps=0.63, force_n=0.64),
     )  # fmt: skip
     limiters = {name: 30 + k for k, name in enumerate(LIMITER_NAMES)}
     faults = {name: {"times": 50 + k, "readings": 70 + k, "seen": 91 + k} for k, name in enumerate(KINDS)}
-    _, drift, forces, counters, injected, memory, _ = (part.splitlines() for part in report.text().split("\n\n"))
+    _, drift, forces, counters, injected, memory, _ = (part.splitlines() for part in numbered.text().split("\n\n"))
     assert drift == [
         "drift",
         "  clock                 17 ns from the ticks at most",
@@ -112,20 +114,20 @@ def test_each_number_of_the_report_stands_beside_its_own_name(found):
         "overruns": 22, "dropped": 23, "refused": 15, "stale_faults": 1600, "recoveries": 24, "scenes_presented": 25,
         "force_stops": 26, "limiters": limiters, "faults": faults, "memory_bytes": [mib, 2 * mib, 7 * mib // 2],
     }  # fmt: skip
-    assert report.table() == report.table() | numbers
+    assert numbered.table() == numbered.table() | numbers
 
 
-def test_counts_of_telemetry_are_compared_only_if_no_sample_was_dropped(found):
+def test_counts_of_telemetry_are_compared_only_if_no_sample_was_dropped(report):
     """With dropped samples telemetry must count less: only ticks = samples + dropped remains to be checked."""
-    more = replace(found, overruns=found.overruns + 1)
-    assert more.findings == (f"{more.overruns} overruns, but the ticks imply {found.counts.overruns}",)
+    more = replace(report, overruns=report.overruns + 1)
+    assert more.findings == (f"{more.overruns} overruns, but the ticks imply {report.counts.overruns}",)
     dropped = replace(more, dropped=7)
-    assert dropped.findings == (f"{found.ticks} ticks do not equal {found.counts.samples} samples plus 7 dropped",)
+    assert dropped.findings == (f"{report.ticks} ticks do not equal {report.counts.samples} samples plus 7 dropped",)
 
 
-def test_the_same_seed_finds_the_same(scenes, found):
+def test_the_same_seed_finds_the_same(scenes, report):
     again = soak_servo(scenes, SHORT_H, virtual=True).table()
-    first = found.table()
+    first = report.table()
     for table in (again, first):
         for name in ("took_s", "memory_bytes"):
             del table[name]
@@ -204,23 +206,23 @@ def test_a_hand_draws_reaches_circles_and_zigzags_within_its_range_and_rests_bet
 
 
 def test_liquids_without_a_wake_are_soaked_too():
-    found = soak_servo(load_scenes("physical_liquids"), 0.01, virtual=True)
-    assert found.findings == ()
-    assert found.drift.comparisons == 0
+    report = soak_servo(load_scenes("physical_liquids"), 0.01, virtual=True)
+    assert report.findings == ()
+    assert report.drift.comparisons == 0
 
 
 @pytest.mark.nightly
 def test_two_real_seconds_tick_in_a_thread_of_their_own(scenes):
-    found = soak_servo(scenes, 2 / 3600, virtual=False)
-    assert found.findings == ()
-    assert found.ticks >= found.planned
-    assert {name: seen for name, _, _, seen in found.faults}["clock_jump"] is None
-    assert found.device.injected.sum() > 0
-    assert "in real time" in found.text()
+    report = soak_servo(scenes, 2 / 3600, virtual=False)
+    assert report.findings == ()
+    assert report.ticks >= report.planned
+    assert {name: count_seen for name, _, _, count_seen in report.faults}["clock_jump"] is None
+    assert report.device.injected.sum() > 0
+    assert "in real time" in report.text()
     assert not any(thread.name == "servo" for thread in threading.enumerate())
 
 
-def test_one_that_is_asked_to_end_says_what_it_has(scenes):
+def test_a_soak_that_is_ended_early_reports_its_results_so_far(scenes):
     ending, lines = threading.Event(), []
 
     def tell(line):
@@ -228,36 +230,36 @@ def test_one_that_is_asked_to_end_says_what_it_has(scenes):
         if "%" in line:
             ending.set()
 
-    found = soak_servo(scenes, SHORT_H, virtual=True, ending=ending, progress=tell)
+    report = soak_servo(scenes, SHORT_H, virtual=True, ending=ending, progress=tell)
     assert lines[-1].startswith(" 10 %")
-    assert 12_000 <= found.ticks < 20_000
-    assert found.verdict.startswith("passed: no faults found in the 1")
-    assert not found.device.last_n.any()
+    assert 12_000 <= report.ticks < 20_000
+    assert report.verdict.startswith("passed: no faults found in the 1")
+    assert not report.device.last_n.any()
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_no_force_ticks_to_and_fro_where_a_hand_keeps_still(scenes, seed):
-    """An passivity in debt once let the force flip between two counts of the encoder, for seconds."""
+    """A passivity observer in debt once let the force flip between two encoder counts for seconds."""
     rested = []
     with Soak({"light_oil": scenes["light_oil"]}, 0.012, virtual=True, seed=seed) as run:
         run.device.allow = lambda _faults, _gap: None
         reader = run.servo.telemetry.reader()
         while run.done < run.ticks:
             run.step()
-            seen = reader.read()
+            samples = reader.read()
             if run.stretch.part == "rest":
-                rested.append(seen.device_force_n.copy())
+                rested.append(samples.device_force_n.copy())
     force_n = np.concatenate(rested)
     assert len(force_n) > 5000
-    felt = np.linalg.norm(force_n[1:], axis=1) > 0.05
-    assert felt.any()
+    has_force = np.linalg.norm(force_n[1:], axis=1) > 0.05
+    assert has_force.any()
     turned = np.sum(force_n[1:] * force_n[:-1], axis=1) < 0
-    assert np.count_nonzero(turned & felt) < 5
+    assert np.count_nonzero(turned & has_force) < 5
 
 
 @pytest.fixture
 def run_soak(tmp_path, monkeypatch, capsys):
-    """Return what runs the command in this process and in an empty folder; it returns exit code and what was said."""
+    """Return a function that runs the command in an empty folder, and returns exit code and output."""
     monkeypatch.chdir(tmp_path)
 
     def run(*words):
@@ -281,13 +283,13 @@ def test_the_command_prints_and_writes_the_report(run_soak):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_command_with_the_report_so_far(run_soak, monkeypatch, number):
-    def interrupted(*given, progress, **named):
+    def interrupted(*arguments, progress, **named):
         def tell(line):
             progress(line)
             if line.startswith(" 10 %"):
                 signal.raise_signal(number)
 
-        return soak_servo(*given, progress=tell, **named)
+        return soak_servo(*arguments, progress=tell, **named)
 
     monkeypatch.setattr("study_app.evidence.soak.soak_servo", interrupted)
     before = signal.getsignal(number)

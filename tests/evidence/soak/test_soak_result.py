@@ -22,10 +22,10 @@ SEEN = {"non_finite": 31, "glitch": 32, "silence": 33, "clock_jump": 34, "stop_b
 
 
 def record(kind: Any, values: dict[str, Any]) -> Any:
-    made = np.zeros(1, kind).view(np.recarray)[0]
+    row = np.zeros(1, kind).view(np.recarray)[0]
     for name, value in values.items():
-        made[name] = value
-    return made
+        row[name] = value
+    return row
 
 
 def result(counts: dict[str, Any] | None = None, device: dict[str, Any] | None = None, **keys: Any) -> SoakResult:
@@ -34,14 +34,14 @@ def result(counts: dict[str, Any] | None = None, device: dict[str, Any] | None =
     limiters[LIMITER_NAMES.index("non_finite")] = 0
     readings = [SEEN[name] for name in KINDS]
     numbers = {"most_n": 7.5, "writes": 1234, "episodes": np.arange(1, 1 + len(KINDS)), "injected": readings}
-    made = SoakResult(
+    sound = SoakResult(
         hours=0.5, virtual=True, seed=9, rate_hz=500.0, scenes=("water", "honey"), planned=2000, ticks=1000,
         took_s=0.25, memory=(2**20, 3 * 2**20, 5 * 2**20), drift=Drift(comparisons=21, worst=2e-10, longest_s=3.5),
         rests=Rests(count=22, pushed_s=0.125, force_n=1e-13), counts=record(_COUNTS, COUNTS | {"limiters": limiters}
         | (counts or {})), device=record(FAULTS, numbers | (device or {})), overruns=12, dropped=10, recoveries=15,
         loads=16, stops=17,
     )  # fmt: skip
-    return replace(made, **keys)
+    return replace(sound, **keys)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_each_violation_is_one_sentence(
     assert wrong.evidence().missed
 
 
-def test_limits_themselves_are_no_violations_and_jumps_count_in_virtual_time_alone() -> None:
+def test_values_at_their_limits_pass_and_jumps_count_only_in_virtual_time() -> None:
     most = result(
         memory=(2**20, 6 * 2**20), drift=Drift(worst=1e-9), rests=Rests(force_n=1e-12), planned=1000, ticks=1000
     )
@@ -88,7 +88,7 @@ def test_limits_themselves_are_no_violations_and_jumps_count_in_virtual_time_alo
     assert [fault.seen for fault in real.faults if fault.name == "clock_jump"] == [None]
 
 
-def test_a_soak_that_was_cut_short_says_what_was_run_and_how_fast() -> None:
+def test_a_soak_that_was_cut_short_states_its_extent_and_speed() -> None:
     evidence = result().evidence()
     assert evidence.text.splitlines()[:3] == [
         "soak test of 0.5 h in virtual time at 500 Hz, seed 9",

@@ -1,4 +1,4 @@
-"""Recordings of real encoders, and what velocity estimators, sample validation and safety layer make of them.
+"""Recordings of real encoders, processed by velocity estimators, sample validation and safety layer.
 
 A motor turns the spindle of a surgical tool at 1 kHz; one encoder counts the spindle, one the motor. A count of the
 spindle stands for one of a Falcon, so that 30° are 26 mm of the hand. Source and licence: ``encoders.md``.
@@ -63,7 +63,7 @@ def accuracy(x_m: Floats, count_m: float, true_mps: Floats) -> NDArray[np.float6
 
     ``x_m`` (n,) are positions of an encoder, ``true_mps`` the velocities without `SETTLED` samples at each end.
     """
-    right, motion, found = true_mps * np.abs(true_mps), _motion(x_m), []
+    right, motion, rows = true_mps * np.abs(true_mps), _motion(x_m), []
     for velocity in ESTIMATORS:
         scene = Scene(scale=1, velocity=velocity, knee=Knee(law="none"))
         samples = samples_along(scene, motion, Dynamics(delay_s=DELAY_S, count_m=count_m, mass_kg=0.2))
@@ -71,8 +71,8 @@ def accuracy(x_m: Floats, count_m: float, true_mps: Floats) -> NDArray[np.float6
         error = 100 * math.sqrt(np.sum((v_mps * np.abs(v_mps) - right) ** 2) / np.sum(right**2))
         wrong_mps = np.zeros((len(v_mps), 3))
         wrong_mps[:, 0] = v_mps - true_mps
-        found.append((error, 1e3 * fast_part(wrong_mps, 1000, _NOISE_HZ, SETTLED, len(v_mps))))
-    return np.array(found)
+        rows.append((error, 1e3 * fast_part(wrong_mps, 1000, _NOISE_HZ, SETTLED, len(v_mps))))
+    return np.array(rows)
 
 
 def smoothed_mps(x_m: Floats, samples: int = SMOOTHED) -> Floats:
@@ -81,7 +81,7 @@ def smoothed_mps(x_m: Floats, samples: int = SMOOTHED) -> Floats:
     return smooth_mps
 
 
-def felt(scene: Scene, x_m: Floats, count_m: float) -> Any:
+def servo_samples(scene: Scene, x_m: Floats, count_m: float) -> Any:
     """Return the samples (n,) of a servo on a device whose encoder counts positions (n,) [m] along x."""
     dynamics = Dynamics(delay_s=DELAY_S, count_m=count_m, mass_kg=0.2)
     safety = new_safety(FORCE_LIMIT_N, dynamics.delay_ticks(scene.rate_hz))

@@ -1,4 +1,4 @@
-"""The groups of cases beside the sweep: what is in them, and that loops and samples are disturbed as they say."""
+"""The groups of cases beside the sweep: their contents, and their disturbances of loops and samples."""
 
 import dataclasses
 import math
@@ -44,7 +44,7 @@ def test_lines_of_earlier_versions_still_describe_the_same_case():
 
 
 def samples(case, ticks):
-    """Return of each tick whether its sample is new, and its position."""
+    """Return for each tick whether its sample is new, and its position."""
     bench, trace = Bench(case), new_trace(case)
     bench.begin()
     fresh, places = [], []

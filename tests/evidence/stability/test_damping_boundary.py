@@ -67,7 +67,7 @@ def line_taps(period_s, samples=15):
     ("period_s", "delay", "published"),
     [(1e-3, 0, 210), (1e-3, 1, 71.5), (1e-3, 2, 43.7), (1e-3, 4, 25.0), (2e-3, 1, 37), (4e-3, 4, 7.2)],
 )
-def test_the_boundary_is_that_of_the_eigenvalues_and_of_the_published_table(period_s, delay, published):
+def test_the_boundary_agrees_with_eigenvalues_and_published_table(period_s, delay, published):
     weight = 1 - 0.9 ** (period_s / 1e-3)
     exact = critical_nspm(period_s, delay, weight)
     measured = boundary_nspm(Ewma(), period_s, delay)
@@ -99,7 +99,7 @@ def test_without_delay_friction_proves_19_times_its_damping():
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", [0, 1, 4])
 @pytest.mark.parametrize("friction_nspm", [0.1, 1.0, 10.0])
-def test_what_is_proved_passive_is_stable(delay, friction_nspm):
+def test_provably_passive_damping_is_stable(delay, friction_nspm):
     proved = passive_nspm(friction_nspm, delay=delay)
     assert proved < boundary_nspm(Ewma(), 1e-3, delay, friction_nspm=friction_nspm)
 
@@ -107,18 +107,18 @@ def test_what_is_proved_passive_is_stable(delay, friction_nspm):
 @pytest.mark.slow
 @pytest.mark.parametrize("velocity", [Ewma(), Ewma(alpha=0.2), Kalman(), Raw()], ids=str)
 def test_the_shipped_table_is_the_one_that_is_measured(velocity):
-    """The first lines of some estimators; the whole is remade by a command."""
+    """This checks the first lines of some estimators; a command recomputes the whole table."""
     value = getattr(velocity, "alpha", None)
     shipped = [it for it in slope_limit_table() if (it.estimator, it.parameter) == (velocity.kind, value)]
     assert len(shipped) == 16
-    for one, measured in zip(shipped[:6], measure_limits([velocity]), strict=False):
-        assert one[:4] == (
+    for row, measured in zip(shipped[:6], measure_limits([velocity]), strict=False):
+        assert row[:4] == (
             measured.estimator,
             measured.parameter,
             pytest.approx(measured.period_s),
             measured.delay_ticks,
         )
-        assert one.limits == pytest.approx(measured.limits, rel=0.02, abs=0.11)
+        assert row.limits == pytest.approx(measured.limits, rel=0.02, abs=0.11)
 
 
 @pytest.mark.slow

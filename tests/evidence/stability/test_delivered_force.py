@@ -15,19 +15,19 @@ compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 @pytest.mark.parametrize("delay", [1, 4])
 def test_the_error_of_a_damper_is_the_lag_of_the_acting_force(delay: int) -> None:
     """A damper whose force lags by EWMA, (1 − α)/α ticks and half a tick, and by the delay; the rest is noise."""
-    found = delivered("viscosityjnd_damper", "ewma", "middle", 0.2, delay=delay)
-    assert found.sine == pytest.approx(100 * 2 * np.pi * 1.6 * (9.5 + delay) * 1e-3, rel=0.05)
-    assert found.parts == {"drag": pytest.approx(100, abs=2)}
-    assert found.withheld < 0.5
-    assert not found.limits
+    result = delivered("viscosityjnd_damper", "ewma", "middle", 0.2, delay=delay)
+    assert result.sine == pytest.approx(100 * 2 * np.pi * 1.6 * (9.5 + delay) * 1e-3, rel=0.05)
+    assert result.parts == {"drag": pytest.approx(100, abs=2)}
+    assert result.withheld < 0.5
+    assert not result.limits
 
 
 @compiled
 def test_no_linear_estimator_of_the_random_motion_is_better_than_the_least_error() -> None:
     """In honey of physical2, whose law is nearly linear; and the law itself, acting in time, has its parts whole."""
     for delay in (1, 4):
-        found = delivered("physical2_honey", "kalman", "firm", 0.2, delay=delay)
-        assert 3 < found.least < found.random
+        result = delivered("physical2_honey", "kalman", "firm", 0.2, delay=delay)
+        assert 3 < result.least < result.random
     law_n = np.cumsum(np.random.default_rng(1).normal(size=9000))
     trace = np.recarray(9000, [("t_s", float), ("position_m", float, 3), ("acting_n", float, 3)])
     trace.t_s = np.arange(9000) / 1000
@@ -50,7 +50,7 @@ def test_the_parts_of_the_law_on_the_true_motion_are_the_law() -> None:
         assert sum(parts_n.values()) == pytest.approx(law_n, abs=1e-9)
 
 
-def found(liquid: str, hand: str = "middle", kg: float = 0.2, *, hz: float = 1.6, **parts: float) -> Delivered:
+def made_up(liquid: str, hand: str = "middle", kg: float = 0.2, *, hz: float = 1.6, **parts: float) -> Delivered:
     """Return a made-up result: 14 % on the sine, 20 % on the random motion (12 % is the least), 11 % in reaches."""
     case = Case(liquid=liquid, estimator="kalman", hand=hand, mass_kg=kg)
     return Delivered(
@@ -60,18 +60,20 @@ def found(liquid: str, hand: str = "middle", kg: float = 0.2, *, hz: float = 1.6
 
 
 def test_values_beyond_a_limit_are_marked_and_counted() -> None:
-    assert found("physical2_glycerin").exceeded == ("sine",)
-    assert found("physical2_honey").exceeded == ()
-    assert found("physical2_olive_oil", inertia=70.0).exceeded == ("sine", "inertia", "random")
-    assert found("physical2_olive_oil", hz=3.0).exceeded == ("drag",)
-    assert found("physical2_olive_oil", "light").limits == {"sine": (0, 19.5)}
-    assert found("physical2_honey", "middle", 0.1).limits == {"sine": (0, 30)}
-    assert found("honey").limits == {}
-    result = delivered_force.delivered_force_evidence((found("physical2_honey"), found("physical2_olive_oil", hz=3.0)))
+    assert made_up("physical2_glycerin").exceeded == ("sine",)
+    assert made_up("physical2_honey").exceeded == ()
+    assert made_up("physical2_olive_oil", inertia=70.0).exceeded == ("sine", "inertia", "random")
+    assert made_up("physical2_olive_oil", hz=3.0).exceeded == ("drag",)
+    assert made_up("physical2_olive_oil", "light").limits == {"sine": (0, 19.5)}
+    assert made_up("physical2_honey", "middle", 0.1).limits == {"sine": (0, 30)}
+    assert made_up("honey").limits == {}
+    result = delivered_force.delivered_force_evidence(
+        (made_up("physical2_honey"), made_up("physical2_olive_oil", hz=3.0))
+    )
     assert "14.0/15" in result.text
     assert "130/80–120*" in result.text
     assert "11.0/15" in result.text
-    assert found("physical2_honey")._replace(reach=15.5).exceeded == ("reach",)
+    assert made_up("physical2_honey")._replace(reach=15.5).exceeded == ("reach",)
     assert "100/85–115 " in result.text
     assert result.text.endswith("1 of 2 rows exceed a limit\n")
     assert result.missed

@@ -29,10 +29,10 @@ def test_a_release_in_honey_differs_by_chance_and_one_with_an_unreported_delay_d
     late_ticks, reasons, monkeypatch
 ):
     """The released grip swings: 10 to 19 mJ with either device, depending on the tick of the release."""
-    opened = EmulatedFalcon.open
+    original_open = EmulatedFalcon.open
 
     def open_late(falcon):
-        opened(falcon)
+        original_open(falcon)
         falcon.hand.state.handle.delay += late_ticks
 
     monkeypatch.setattr(EmulatedFalcon, "open", open_late)

@@ -16,7 +16,7 @@ from tests.haptics.scenes import COMPILED
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
 
-def imposed(case, *, safe=True, rules=CURRENT):
+def imposed_trace(case, *, safe=True, rules=CURRENT):
     """Return the trace of a position that is imposed: circles of 20 mm at 0.1 m/s, begun within 0.2 s."""
     t_s = np.arange(1500) / 1000
     angle = 5 * (t_s + 0.2 * np.expm1(-t_s / 0.2))
@@ -37,8 +37,8 @@ def test_the_force_of_the_effects_comes_so_late(delay, liquid, scale, more):
     The known force is not used with a delayed force, so the other loop does not use it either.
     """
     case = Case(liquid=liquid, scale=scale, quantum_um=1.0, delay=0, **more)
-    prompt = imposed(case, rules=CURRENT._replace(known_force_ticks=99))
-    late = imposed(parse_case(f"{case} force_delay_ms={delay}"))
+    prompt = imposed_trace(case, rules=CURRENT._replace(known_force_ticks=99))
+    late = imposed_trace(parse_case(f"{case} force_delay_ms={delay}"))
     assert late.withheld_n.max() < 1e-3  # the controller has nothing to do: another force would not be the prompt one
     shifted_n = np.zeros_like(prompt.sent_n)
     shifted_n[delay:] = prompt.sent_n[:-delay]
@@ -51,7 +51,7 @@ def test_the_force_of_the_effects_comes_so_late(delay, liquid, scale, more):
 @pytest.mark.slow
 def test_the_force_comes_so_late_without_safety_too():
     case = Case(liquid="physical_tar", scale=1.0, quantum_um=1.0, delay=0)
-    prompt, late = (imposed(it, safe=False).sent_n for it in (case, parse_case(f"{case} force_delay_ms=7")))
+    prompt, late = (imposed_trace(it, safe=False).sent_n for it in (case, parse_case(f"{case} force_delay_ms=7")))
     assert np.abs(prompt).max() > 1
     assert late[7:] == pytest.approx(prompt[:-7], abs=1e-9)
 
@@ -59,7 +59,7 @@ def test_the_force_comes_so_late_without_safety_too():
 @compiled
 @pytest.mark.slow
 def test_a_delayed_force_gives_energy_that_the_controller_withholds():
-    """A damper that is late by T is a mass of -B T; what is left of it stays bounded."""
+    """A damper that is late by T acts as a mass of -B T; the remaining energy stays bounded."""
     case = Case(liquid="light_oil", scale=10.0, hand="light", force_delay_ms=100.0)
     trace = delayed_trace(case)
     assert np.linalg.norm(trace.sent_n, axis=1).max() <= 8.0 * (1 + 1e-9)

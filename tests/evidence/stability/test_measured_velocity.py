@@ -1,4 +1,4 @@
-"""Loops whose device measures the velocity: its lag is the one that is stated, and the limits of that lag are kept."""
+"""Loops whose device measures the velocity: its lag is the stated one, and its limits apply."""
 
 import dataclasses
 
@@ -15,7 +15,7 @@ compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
 
 @compiled
-def test_the_tick_uses_what_the_device_measures() -> None:
+def test_the_tick_uses_the_velocity_that_the_device_measures() -> None:
     case = Case(estimator=DEVICE, velocity_lag=2.0, hand="firm", liquid="water")
     bench, trace = Bench(case), new_trace(case)
     bench.begin()

@@ -11,8 +11,8 @@ from tests.evidence.stability.recorded_encoders import (
     FORCE_LIMIT_N,
     accuracy,
     excerpt,
-    felt,
     positions_m,
+    servo_samples,
     smoothed_mps,
 )
 from tests.haptics.scenes import COMPILED
@@ -35,7 +35,7 @@ def test_no_sample_of_a_real_encoder_is_rejected(encoder: str, study: str, liqui
     for name, counts in excerpt().items():
         x_m = positions_m(counts, encoder)
         fastest_mps = max(fastest_mps, 1e3 * float(np.abs(np.diff(x_m)).max()))
-        samples = felt(scene, x_m, COUNTS_M[encoder])
+        samples = servo_samples(scene, x_m, COUNTS_M[encoder])
         assert not (samples.limiters & ~LIMITERS).any(), name
         assert not samples.status.any(), name
         assert np.linalg.norm(samples.device_force_n, axis=1).max() <= FORCE_LIMIT_N * (1 + 1e-9)
@@ -46,17 +46,17 @@ def test_no_sample_of_a_real_encoder_is_rejected(encoder: str, study: str, liqui
 def test_accuracy_on_real_encoders_ranks_the_estimators() -> None:
     """The spindle vibrates by a count at 10 to 60 Hz: Kalman filters of earlier rules had errors of 48 %, EWMA 31 %."""
     pairs = (("spindle", "spindle"), ("spindle", "motor"), ("motor", "motor"))
-    found = {}
+    accuracies_of = {}
     for encoder, smooth in pairs:
         measured = [
             accuracy(positions_m(counts, encoder), COUNTS_M[encoder], smoothed_mps(positions_m(counts, smooth)))
             for counts in excerpt().values()
         ]
         means = np.mean(measured, axis=0)
-        found[encoder, smooth] = {velocity.kind: means[k] for k, velocity in enumerate(ESTIMATORS)}
-    for accuracies in found.values():
+        accuracies_of[encoder, smooth] = {velocity.kind: means[k] for k, velocity in enumerate(ESTIMATORS)}
+    for accuracies in accuracies_of.values():
         assert (accuracies["kalman"] < accuracies["ewma"]).all()
-    coarse, fine = found["spindle", "spindle"], found["motor", "motor"]
+    coarse, fine = accuracies_of["spindle", "spindle"], accuracies_of["motor", "motor"]
     assert fine["kalman"][0] < min(10, 0.6 * fine["ewma"][0])
     assert coarse["raw"][0] == max(error for error, _ in coarse.values())
     assert all(coarse[kind][0] > fine[kind][0] for kind in coarse)

@@ -1,4 +1,4 @@
-"""Hard cases of the closed loop: some of them unstable without safety, none with it; and what safety takes away."""
+"""Hard cases of the closed loop: some unstable without the safety layer, none with it; and the withheld force."""
 
 import dataclasses
 from concurrent.futures import ThreadPoolExecutor
@@ -38,7 +38,7 @@ def swept():
 
 
 @compiled
-def test_many_are_unstable_without_safety_and_none_with_it(swept):
+def test_many_cases_are_unstable_without_the_safety_layer_but_none_with_it(swept):
     unstable = [verdict for verdict in swept.off if verdict.reasons]
     assert len(unstable) > 25
     assert {reason for verdict in unstable for reason in verdict.reasons} >= {"energy", "oscillation"}
@@ -56,13 +56,13 @@ def test_the_strongest_linear_damper_is_unstable_without_safety_and_stable_with_
 @pytest.mark.nightly
 @compiled
 def test_verdicts_do_not_depend_on_the_executor(all_workers):
-    found = []
+    sweeps = []
     for workers in all_workers:
         with open_executor(workers) as executor:
             judged = stability.run_sweep(evenly_chosen(sweep(), 6), [Group("gentle", (Case(plant="arm"),))], executor)
-        found.append(repr(dataclasses.replace(judged, took_s=0.0)))
+        sweeps.append(repr(dataclasses.replace(judged, took_s=0.0)))
     assert len(judged.on) == 6
-    assert all(verdicts == found[0] for verdicts in found)
+    assert all(verdicts == sweeps[0] for verdicts in sweeps)
 
 
 NOISY_SAMPLES = "quantum_um=60 noise_um=30 viscous_nspm=0.5"
@@ -118,7 +118,7 @@ def test_only_an_oscillation_lasts_when_the_encoder_becomes_exact(liquid, reason
 @pytest.mark.parametrize("speed_mps", [0.1, 0.2, 0.3, 0.6, 1.0])
 @pytest.mark.parametrize("quantum_um", [20.0, 38.0, 60.0])
 def test_a_handle_without_any_friction_comes_to_rest_in_tar(speed_mps, quantum_um):
-    """No case is harder on a study's loop: three of these swung on, at up to 65 mm/s, while a debt weighed half."""
+    """The hardest case for a study's loop: three of these kept swinging at up to 65 mm/s when a debt counted half."""
     thrown = Case(liquid="physical_tar", scale=20.0, hand="thrown", motion="stroke", viscous_nspm=0.0)
     for jitter, missed in ((0.0, 0.0), (0.0, 0.02), (0.2, 0.0), (0.2, 0.02)):
         changed = {"speed_mps": speed_mps, "quantum_um": quantum_um, "jitter": jitter, "missed": missed}
@@ -150,7 +150,7 @@ def test_a_case_is_a_line_that_reproduces_it(case):
         ("hand=three", "not permitted: choose light"),
     ],
 )
-def test_a_line_that_is_no_case_is_told_in_one_sentence(line, said):
+def test_an_invalid_line_is_reported_in_one_sentence(line, said):
     with pytest.raises(StudyError, match=said) as caught:
         parse_case(line)
     assert "\n" not in str(caught.value)
@@ -159,17 +159,17 @@ def test_a_line_that_is_no_case_is_told_in_one_sentence(line, said):
 @compiled
 @pytest.mark.parametrize("name", PRESETS)
 def test_in_a_studys_loop_a_held_liquid_is_felt_as_it_is(name):
-    for found in stability.fidelities([name], STUDY_LOOPS):
-        assert found.within, found
-        assert found.force_n > 0
-        assert found.beyond < 0.03
+    for fidelity in stability.fidelities([name], STUDY_LOOPS):
+        assert fidelity.within, fidelity
+        assert fidelity.force_n > 0
+        assert fidelity.beyond < 0.03
 
 
 @compiled
 @pytest.mark.parametrize("name", LIMITED)
-def test_what_no_handle_bears_is_said_to_be_limited(name):
-    (found,) = stability.fidelities([name], STUDY_LOOPS[1:])
-    assert not found.within
+def test_a_force_that_no_handle_tolerates_is_reported_as_limited(name):
+    (fidelity,) = stability.fidelities([name], STUDY_LOOPS[1:])
+    assert not fidelity.within
 
 
 def command(*words):
@@ -191,7 +191,7 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     assert {parse_case(line).plant for line in lines} == {"handle", "arm", "falcon"}
 
 
-def test_it_tolerates_one_noisy_case_in_10000_and_no_unstable_one():
+def test_one_noisy_case_in_10000_is_tolerated_but_no_unstable_one():
     stable = Verdict(
         case=Case(),
         safe=True,

@@ -1,4 +1,4 @@
-"""The accuracy of velocity estimators: measured as its closed form says."""
+"""The accuracy of velocity estimators: measured values agree with closed forms."""
 
 import math
 
@@ -15,25 +15,25 @@ compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 @compiled
 @pytest.mark.slow
 @pytest.mark.parametrize("alpha", [0.05, 0.1])
-def test_error_of_ewma_is_that_of_its_frequency_response(alpha):
-    found = errors(Ewma(alpha=alpha))
-    for stroke in (it for it in found if it.frequency_hz and it.amplitude_m == 0.03):
+def test_the_error_of_ewma_follows_its_frequency_response(alpha):
+    stroke_errors = errors(Ewma(alpha=alpha))
+    for stroke in (it for it in stroke_errors if it.frequency_hz and it.amplitude_m == 0.03):
         w, t_s = 2 * math.pi * stroke.frequency_hz, np.linspace(0, 1, 10_000)
         passed = ewma_response(alpha, 1e-3, w)
         true = np.cos(w * t_s)
-        seen = abs(passed) * np.cos(w * t_s + np.angle(passed))
-        expected = np.sqrt(np.mean((seen * abs(seen) - true * abs(true)) ** 2) / np.mean(true**4))
-        assert found[stroke] == pytest.approx(100 * expected, rel=0.03), stroke
+        estimated = abs(passed) * np.cos(w * t_s + np.angle(passed))
+        expected = np.sqrt(np.mean((estimated * abs(estimated) - true * abs(true)) ** 2) / np.mean(true**4))
+        assert stroke_errors[stroke] == pytest.approx(100 * expected, rel=0.03), stroke
 
 
 @compiled
 @pytest.mark.slow
-def test_noise_of_the_raw_difference_is_that_of_its_counts():
+def test_the_noise_of_the_raw_difference_follows_from_its_counts():
     """At v each tick has one count with probability p = v T/count, else none: count/T √(p (1 - p)), nearly all fast."""
-    found = noise_mmps(Raw())
+    noise_by_speed = noise_mmps(Raw())
     for speed_mps in (0.005, 0.02):
         p = speed_mps * 1e-3 / COUNT_M
-        assert found[speed_mps] == pytest.approx(1e3 * COUNT_M / 1e-3 * math.sqrt(p * (1 - p)), rel=0.05)
+        assert noise_by_speed[speed_mps] == pytest.approx(1e3 * COUNT_M / 1e-3 * math.sqrt(p * (1 - p)), rel=0.05)
 
 
 @compiled

@@ -39,7 +39,7 @@ def test_no_filter_of_counted_positions_finds_the_velocity_better(count_m: float
 @pytest.mark.parametrize(
     ("liquid", "percent"), [("water", (16.5, 12.4, 11.2)), ("glycerin", (9.3, 6.6, 5.9)), ("honey", (6.1, 4.5, 4.0))]
 )
-def test_bounds_of_physical2_are_those_of_an_outside_check(liquid: str, percent: tuple[float, ...]) -> None:
+def test_bounds_of_physical2_agree_with_an_independent_check(liquid: str, percent: tuple[float, ...]) -> None:
     scene = without_buoyancy(scenes()[f"physical2_{liquid}"])
-    found = [100 * wiener_bound(scene, count_m, 1e-3) for count_m in (38e-6, 14e-6, 10e-6)]
-    assert found == pytest.approx(percent, rel=0.16)
+    bounds = [100 * wiener_bound(scene, count_m, 1e-3) for count_m in (38e-6, 14e-6, 10e-6)]
+    assert bounds == pytest.approx(percent, rel=0.16)

@@ -21,16 +21,18 @@ compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 @compiled
 def test_slow_strokes_lose_nothing_and_shares_lie_between_0_and_1():
     shares = measure_withheld_force(["syrup"])
-    assert {(found.estimator, found.mode) for found in shares} == set(itertools.product(("ewma", "kalman"), MODES))
-    for found in shares:
-        assert found.strokes[0] == pytest.approx(0.0, abs=1e-3)
-        assert all(0.0 <= share <= 1.0 for share in (*found.strokes, *sum(found.after, ())))
+    assert {(share_of.estimator, share_of.mode) for share_of in shares} == set(
+        itertools.product(("ewma", "kalman"), MODES)
+    )
+    for withheld in shares:
+        assert withheld.strokes[0] == pytest.approx(0.0, abs=1e-3)
+        assert all(0.0 <= share <= 1.0 for share in (*withheld.strokes, *sum(withheld.after, ())))
 
 
 @pytest.mark.slow
 @compiled
 def test_a_second_after_the_hand_was_shaken_the_whole_force_arrives():
-    """Under the rules before, up to 28 and 56 % are still withheld with `ewma`."""
+    """Under earlier rules, up to 28 and 56 % were still withheld with `ewma`."""
     liquids = measure_withheld_force(["light_oil", "physical_honey"])
     shaken = [liquid for liquid in liquids if liquid.mode == SHAKEN]
     assert len(shaken) == 4

@@ -1,4 +1,4 @@
-"""Known thresholds and exponents are recovered, and an observer that is wrong is found."""
+"""Known thresholds and exponents are recovered, and wrong estimators are detected."""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -62,9 +62,9 @@ def ten_people() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def threshold() -> KnownThreshold:
-    found = known_value("small", parse(SMALL.encode(), "small.toml"))
-    assert isinstance(found, KnownThreshold)
-    return found
+    known = known_value("small", parse(SMALL.encode(), "small.toml"))
+    assert isinstance(known, KnownThreshold)
+    return known
 
 
 @pytest.fixture(scope="module")
@@ -74,9 +74,9 @@ def thresholds(threshold: KnownThreshold) -> list[StudyFound]:
 
 @pytest.fixture(scope="module")
 def exponent() -> KnownExponent:
-    found = known_value("thickness", load("thickness"))
-    assert isinstance(found, KnownExponent)
-    return found
+    known = known_value("thickness", load("thickness"))
+    assert isinstance(known, KnownExponent)
+    return known
 
 
 @pytest.fixture(scope="module")
@@ -123,12 +123,12 @@ def test_people_prefer_an_interval_or_their_last_answer_and_learn(delays: bool) 
     assert first(of_person(delays, repeats=0.5), 0.0, Course(last="first")) == preferred
     assert first(of_person(delays, repeats=0.5), 0.0, Course(last="second")) == pytest.approx(0.31, abs=0.03)
     learning = of_person(delays, change=1 / 1.5)
-    for done in (0.0, 0.5, 1.0):
-        assert first(learning, threshold * 1.5 ** (0.5 - done), Course(done)) == pytest.approx(0.75, abs=0.03)
+    for progress in (0.0, 0.5, 1.0):
+        assert first(learning, threshold * 1.5 ** (0.5 - progress), Course(progress)) == pytest.approx(0.75, abs=0.03)
 
 
 @pytest.mark.slow
-def test_what_has_no_threshold_is_refused() -> None:
+def test_a_study_without_a_threshold_is_refused() -> None:
     with pytest.raises(ValueError, match="rek2024 does not have a main block"):
         known_value("rek2024", load("rek2024"))
     ran = CliRunner().invoke(commands, ["validate", "rek2024"])
@@ -156,7 +156,7 @@ def test_the_threshold_is_recovered(threshold: KnownThreshold, thresholds: list[
     assert threshold.threshold == 0.24
     assert 0.1 < threshold.spread(thresholds, 3) < 0.6
     assert threshold.spread(thresholds, 10) < threshold.spread(thresholds, 3)
-    planted = {one.truth for found in thresholds for (one,) in found.own}
+    planted = {estimate.truth for study in thresholds for (estimate,) in study.own}
     assert len(planted) == 200, "people differ"
 
 
@@ -164,14 +164,16 @@ def verdicts(known: KnownThreshold | KnownExponent, studies: list[StudyFound]) -
     return verdicts_on([*known.measures(studies), *coverage("small", studies)])
 
 
-def changed(found: StudyFound, factor: float, reach: float) -> StudyFound:
+def with_factors(study: StudyFound, factor: float, reach: float) -> StudyFound:
     """Return a study with estimates and intervals times a factor, and the intervals ``reach`` times as wide."""
 
-    def one(it: Estimated) -> Estimated:
+    def changed_estimate(it: Estimated) -> Estimated:
         low, high = (it.value * factor * (end / it.value) ** reach for end in (it.low, it.high))
         return Estimated(value=it.value * factor, low=low, high=high, truth=it.truth)
 
-    return StudyFound(tuple(map(one, found.group)), tuple(tuple(map(one, person)) for person in found.own))
+    return StudyFound(
+        tuple(map(changed_estimate, study.group)), tuple(tuple(map(changed_estimate, person)) for person in study.own)
+    )
 
 
 @pytest.mark.nightly
@@ -185,7 +187,7 @@ def test_another_estimator_and_another_interval_are_noticed(
     few = {"studies with 20 participants within ±15 %"}  # 60 trials are few
     assert {row.what for row in verdicts(long, studies) if not row.holds} <= few
     for factor, reach in ((1.1, 1.0), (0.9, 1.0), (1.0, 0.7), (1.0, 1.3)):
-        other = [changed(one, factor, reach) for one in studies]
+        other = [with_factors(study, factor, reach) for study in studies]
         missed = {row.what for row in verdicts(long, other) if not row.holds}
         assert ("mean error of the threshold" if reach == 1.0 else "coverage of participants' 95 % intervals") in missed
 
@@ -207,22 +209,23 @@ def test_studies_without_intervals_of_participants_are_left_out_of_their_coverag
     of_group = (Estimated(value=1.0, low=0.5, high=2.0, truth=1.0),)
     without = StudyFound(of_group, ((Estimated(value=1.0, truth=1.0),),))
     verdicts = verdicts_on([*coverage("all", [StudyFound(of_group, (of_group, of_group)), without] * 10)])
-    assert [one.value.split()[0] for one in verdicts] == ["100.0", "100.0"]
+    assert [verdict.value.split()[0] for verdict in verdicts] == ["100.0", "100.0"]
 
 
 def test_limits_allow_for_the_number_of_values() -> None:
-    """Of 60 coverages exactly at their limit, none is beyond it in 95 % of runs; each alone would be in 2.5 %."""
+    """Of 60 coverages exactly at their limit, none exceeds it in 95 % of runs; each alone would in 2.5 %."""
     draw, runs = np.random.default_rng(17), 200
 
     def one_run() -> bool:
         measures = []
         for number in range(60):
             held = draw.random(100) < known_values.MIN_COVERAGE
-            found = [
-                StudyFound((Estimated(value=1.0, low=0.5, high=2.0 if one else 0.9, truth=1.0),), ()) for one in held
+            made_up = [
+                StudyFound((Estimated(value=1.0, low=0.5, high=2.0 if is_covered else 0.9, truth=1.0),), ())
+                for is_covered in held
             ]
-            measures += coverage(str(number), found)
-        return not all(one.holds for one in verdicts_on(measures))
+            measures += coverage(str(number), made_up)
+        return not all(verdict.holds for verdict in verdicts_on(measures))
 
     assert sum(one_run() for _ in range(runs)) <= 0.05 * runs + 2 * (0.05 * 0.95 * runs) ** 0.5
 
@@ -240,18 +243,18 @@ def test_studies_of_all_seeds_count_together_and_each_seed_once(
     threshold: KnownThreshold, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(known_values, "rehearse_known", lambda *_: Rehearsed(1.0, 0, (0.24,) * 3))
-    told = []
+    progress_lines = []
     with ThreadPoolExecutor(1) as executor:
         said: list[str] = []
         rows = validate_known_values(
-            [(b"", threshold)], 2, (1, 2, 1), executor, lambda words, _share: told.append(words), said.append
+            [(b"", threshold)], 2, (1, 2, 1), executor, lambda words, _share: progress_lines.append(words), said.append
         )
-    assert "small: 4 of 4 studies" in told
+    assert "small: 4 of 4 studies" in progress_lines
     assert sorted(said[:2]) == ["small: 2 simulated participants rehearsed", "small: 4 studies"]
     assert said[-1].startswith("people, a mix of these: ")
-    found = [threshold.simulate(number, seed) for seed in (1, 2) for number in range(2)]
-    own = [*threshold.measures(found), *coverage("small", found)]
-    assert rows[: len(own)] == [one.verdict(1 - 0.05 / len(rows)) for one in own]
+    simulated = [threshold.simulate(number, seed) for seed in (1, 2) for number in range(2)]
+    own = [*threshold.measures(simulated), *coverage("small", simulated)]
+    assert rows[: len(own)] == [measure.verdict(1 - 0.05 / len(rows)) for measure in own]
 
 
 @pytest.mark.nightly
@@ -269,19 +272,19 @@ def test_the_whole_program_recovers_it_and_another_observer_is_found(threshold: 
 
 def test_without_noise_the_known_exponent_is_found(exponent: KnownExponent, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(known_values, "ESTIMATE_NOISE", 1e-6)
-    found = exponent.simulate(0, seed=1, people=3)
-    assert [own.value for (own,) in found.own] == pytest.approx([own.truth for (own,) in found.own], abs=1e-5)
+    simulated = exponent.simulate(0, seed=1, people=3)
+    assert [own.value for (own,) in simulated.own] == pytest.approx([own.truth for (own,) in simulated.own], abs=1e-5)
 
 
 @pytest.mark.slow
-def test_studies_recover_the_exponent_and_a_wrong_one_is_found(
+def test_studies_recover_the_exponent_and_detect_a_wrong_one(
     exponent: KnownExponent, exponents: list[StudyFound]
 ) -> None:
     judged = verdicts(exponent, exponents)
     assert judged[0].what == "exponent against viscosity_pa_s"
     assert all(row.holds for row in judged), judged
     assert exponent.simulate(0, seed=1).group == exponents[0].group != exponent.simulate(0, seed=2).group
-    means = [found.group[0].value for found in exponents]
+    means = [study.group[0].value for study in exponents]
     steeper = [StudyFound((Estimated(value=1.15 * mean, low=0.0, high=1.0),), ()) for mean in means]
     assert not verdicts_on([*exponent.measures(steeper)])[0].holds
     narrow = [StudyFound((Estimated(value=mean, low=mean, high=mean, truth=EXPONENT),), ()) for mean in means]

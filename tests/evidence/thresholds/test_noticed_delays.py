@@ -19,25 +19,25 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def found() -> Compared:
+def comparison() -> Compared:
     return compare_delays(40, 1)
 
 
-def test_the_forced_choice_finds_the_known_delay_and_the_rating_the_criterion(found: Compared) -> None:
-    middle, low, high = found.detected_ms
+def test_the_forced_choice_finds_the_known_delay_and_the_rating_the_criterion(comparison: Compared) -> None:
+    middle, low, high = comparison.detected_ms
     assert low < 1000 * JND_S < high
     assert middle == pytest.approx(1000 * JND_S, rel=0.1)
-    plain = [one for one in found.ratings if not one.adapted_s]
-    thresholds = [float(one.found.effect or 0.0) for one in plain]
+    plain = [rating for rating in comparison.ratings if not rating.adapted_s]
+    thresholds = [float(rating.found.effect or 0.0) for rating in plain]
     assert thresholds == sorted(thresholds)
-    for one, threshold in zip(plain, thresholds, strict=True):
-        assert threshold == pytest.approx(1000 * one.criterion_s, abs=20)
-        assert one.found.lower is not None
-        assert one.found.lower > high
-    assert [one.criterion_s for one in plain] == list(CRITERIA_S)
+    for rating, threshold in zip(plain, thresholds, strict=True):
+        assert threshold == pytest.approx(1000 * rating.criterion_s, abs=20)
+        assert rating.found.lower is not None
+        assert rating.found.lower > high
+    assert [rating.criterion_s for rating in plain] == list(CRITERIA_S)
 
 
-def test_adaptation_moves_the_rating_and_no_forced_choice(found: Compared) -> None:
+def test_adaptation_shifts_ratings_but_not_forced_choices(comparison: Compared) -> None:
     people = draw_people(400, 2)
     before, after = (rate_delays(people, MEAN_CRITERION_S, adapted, 2).found.effect for adapted in (0.0, 0.03))
     assert before is not None

@@ -36,7 +36,7 @@ def test_a_tick_that_comes_late_is_late_by_all_of_it_and_passes_deadlines_over()
 
 
 def test_no_python_is_called_in_a_tick():
-    """Ten times the ticks make not one call more of a Python function, nor of one of its C functions."""
+    """Ten times as many ticks make no additional call of a Python or C function of the interpreter."""
     servo = Servo(PlayedHand(hand_motion()), clock=VirtualClock(), elements=elements_needed(FULL))
     servo.load(FULL)
     servo.advance(1)
@@ -74,9 +74,9 @@ def test_a_race_times_every_loop_in_every_class_it_is_granted():
     raced = measure_timing(0.5, "none", FakeWindows(), progress=lines.append)
     levels = ["normal"] if granted_classes().best is None else ["normal", granted_classes().best.level]
     assert list(raced.levels) == levels
-    assert [one.kind for one in raced.loops][:4] == ["servo", "bare", "thread", "qt"]
-    assert {one.ticks for one in raced.loops} == {500}
-    assert all((one.lateness_ns >= 0).all() for one in raced.loops)
+    assert [loop.kind for loop in raced.loops][:4] == ["servo", "bare", "thread", "qt"]
+    assert {loop.ticks for loop in raced.loops} == {500}
+    assert all((loop.lateness_ns >= 0).all() for loop in raced.loops)
     assert len(raced.limits()) == 4 * len(levels)
     assert lines[-1] == "100 %"
     assert raced.frames_hz is None
@@ -85,7 +85,7 @@ def test_a_race_times_every_loop_in_every_class_it_is_granted():
 
 @pytest.fixture
 def run(monkeypatch, capsys, tmp_path):
-    """Return what runs the command in this process; it returns exit code and what was said."""
+    """Return a function that runs the command in this process, and returns exit code and output."""
     monkeypatch.chdir(tmp_path)
 
     def command(*words):
@@ -112,9 +112,9 @@ def test_processes_that_keep_cores_busy_end_with_this_one_where_a_parents_id_nev
     """On Windows; a program that is killed closes its pipes, as this test does."""
     start, started = subprocess.Popen, []
 
-    def start_on_windows(command, **given):
+    def start_on_windows(command, **options):
         unchanging = f"import os\nos.getppid = lambda: 1\n{command[-1]}"
-        started.append(start([*command[:-1], unchanging], **given))
+        started.append(start([*command[:-1], unchanging], **options))
         return started[-1]
 
     monkeypatch.setattr(subprocess, "Popen", start_on_windows)

@@ -47,10 +47,10 @@ def main(folder: str) -> int:
         return False
 
     protocol = short.write(Path(folder))
-    text, found = re.subn(
+    text, count = re.subn(
         r"^max_s = 30\b", f"max_s = {LONGEST_S}", protocol.read_text(encoding="utf-8"), flags=re.MULTILINE
     )
-    assert found == 1
+    assert count == 1
     protocol.write_text(text, encoding="utf-8", newline="\n")
     application = application_here()
     person = Person(watch)

@@ -24,7 +24,7 @@ SEED = 7
 
 
 def forked(task: Callable[[], object], until: Callable[[], object] | None = None) -> int:
-    """Do ``task`` in a fork, killed when ``until`` returns; return its exit code, negative where a signal ended it."""
+    """Run ``task`` in a fork that is killed when ``until`` returns; return its exit code, negative after a signal."""
     child = os.fork()
     if child == 0:
         code = 1
@@ -51,7 +51,7 @@ def session(protocol: str, folder: Path) -> None:
 
 
 def grown(path: Path, size: int) -> None:
-    """Wait until a journal has this size, or its session has ended."""
+    """Wait until a journal has this size or its session has ended."""
     while size_of(path) < size and not has_ended(path):
         time.sleep(0.0002)
 
@@ -70,7 +70,7 @@ def has_ended(journal: Path) -> bool:
 
 
 def going_on(protocol: str, folder: Path) -> Callable[[], object]:
-    """Return what completes a session that was killed."""
+    """Return the function that completes a killed session."""
     place = folder / "data" / "sub-P001" / "ses-01"
     journal = place / "journal.jsonl"
     if has_ended(journal):

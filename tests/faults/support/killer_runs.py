@@ -9,7 +9,7 @@ from typing import Any
 
 def outcomes_of(killer: str, *arguments: object, limit_s: float = 150.0) -> list[dict[str, Any]]:
     """Run a module of this folder, ``killer`` or ``command_killer``; return its lines of JSON."""
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-m", f"tests.faults.support.{killer}", *map(str, arguments)],
         cwd=Path(__file__).parents[3],
         capture_output=True,
@@ -17,5 +17,5 @@ def outcomes_of(killer: str, *arguments: object, limit_s: float = 150.0) -> list
         timeout=limit_s,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    assert process.returncode == 0, process.stderr
+    return [json.loads(line) for line in process.stdout.splitlines()]

@@ -1,4 +1,4 @@
-"""Programs that do the same thing at the same moment."""
+"""Processes that run the same task at the same moment."""
 
 import multiprocessing
 from collections.abc import Callable
@@ -24,8 +24,10 @@ def race(task: Callable[[int, int], AbstractContextManager[Any]], rounds: int, p
     forks = [forking.Process(target=run, args=(program,)) for program in range(programs)]
     for fork in forks:
         fork.start()
-    found = sorted((answers.get(timeout=120) for _ in range(rounds * programs)), key=lambda one: one[:2])
+    results = sorted((answers.get(timeout=120) for _ in range(rounds * programs)), key=lambda result: result[:2])
     for fork in forks:
         fork.join(30)
         assert fork.exitcode == 0
-    return [[answer for _, _, answer in found[first : first + programs]] for first in range(0, len(found), programs)]
+    return [
+        [answer for _, _, answer in results[first : first + programs]] for first in range(0, len(results), programs)
+    ]

@@ -17,8 +17,8 @@ def write(folder: Path, *, resume: str = "trial") -> Path:
     """Write the study's protocol into ``folder`` and return it."""
     text = source_bytes("demo").decode()
     for key, value in (*QUICK, ("resume", f'"{resume}"')):
-        text, found = re.subn(rf'^{key} = ("\w+"|[\d.]+)', f"{key} = {value}", text, flags=re.MULTILINE)
-        assert found == 1, key
+        text, count = re.subn(rf'^{key} = ("\w+"|[\d.]+)', f"{key} = {value}", text, flags=re.MULTILINE)
+        assert count == 1, key
     for number, name in enumerate(STATEMENTS, start=1):
         assert f'"{name}"' in text
         text = text.replace(f'"{name}"', f'"statement_{number}"')

@@ -1,4 +1,4 @@
-"""A session in real windows that a device, a panel and the recorder fail in, one after the other: run as a program.
+"""A session in real windows in which a device, a panel and the recorder fail in turn: run as a program.
 
 With the emulated Falcon, driven by keys and clicks. It prints one JSON object: what was seen and measured at each
 step. With a folder for pictures, a picture of the screens is kept at each step.
@@ -136,7 +136,7 @@ class Scene:
         return True
 
     def see_lines(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
-        failed = [one.text() for one in operator.findChildren(QLabel) if "session continues" in one.text()]
+        failed = [label.text() for label in operator.findChildren(QLabel) if "session continues" in label.text()]
         if len(failed) == 2:
             self.told["panels"] = sorted(failed)
             self.told["force with failed panels"] = self.rig.servo.force_is_on
@@ -159,7 +159,7 @@ class Scene:
 
     def lose_recording(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         lost = operator.rail.tally.beyond.text()
-        notices = [one.text() for one in operator.findChildren(QLabel) if "recorder" in one.text()]
+        notices = [label.text() for label in operator.findChildren(QLabel) if "recorder" in label.text()]
         if "lost" in lost and notices:  # the tally may be shown first
             recordings.SamplesFile = self.samples_file
             self.told["recording"] = lost
@@ -194,7 +194,7 @@ def _fails(*_arguments: object) -> None:
 
 
 class Ended(BaseException):
-    """What no guard for exceptions holds back."""
+    """An exception that no handler catches."""
 
 
 def _ends(*_arguments: object) -> None:

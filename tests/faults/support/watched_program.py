@@ -17,7 +17,9 @@ W = TypeVar("W", bound=QWidget)
 
 def window(kind: type[W]) -> W | None:
     """Return the window of that kind that is shown."""
-    return next((one for one in QApplication.topLevelWidgets() if isinstance(one, kind) and one.isVisible()), None)
+    return next(
+        (widget for widget in QApplication.topLevelWidgets() if isinstance(widget, kind) and widget.isVisible()), None
+    )
 
 
 def answer(participant: ParticipantWindow, page: QuestionnairePage) -> None:
@@ -47,7 +49,7 @@ class Person(QObject):
         self._timer.start(every_ms)
 
     def leave(self) -> None:
-        """Look no more."""
+        """Stop watching."""
         self._timer.stop()
         self.deleteLater()
 
@@ -71,15 +73,15 @@ class Person(QObject):
 
 
 def words_of(top: QWidget) -> set[str]:
-    """Return all that a window says: titles, texts, tips and names for those who cannot see."""
-    found = {top.windowTitle()}
+    """Return the titles, texts, tips and accessible names of a window."""
+    words = {top.windowTitle()}
     for widget in (top, *top.findChildren(QWidget)):
-        found |= {widget.accessibleName(), widget.accessibleDescription(), widget.toolTip(), widget.windowTitle()}
-        found |= {widget.objectName(), widget.statusTip(), widget.whatsThis()}
+        words |= {widget.accessibleName(), widget.accessibleDescription(), widget.toolTip(), widget.windowTitle()}
+        words |= {widget.objectName(), widget.statusTip(), widget.whatsThis()}
         text = getattr(widget, "text", None)
         if callable(text):
-            found.add(str(text()))
-    return found
+            words.add(str(text()))
+    return words
 
 
 def traces_of(operator: OperatorWindow) -> set[str]:

@@ -37,7 +37,7 @@ class StoredWorld(World):
         self.runner.post(Begin(self.clock()))
 
     def step(self) -> None:
-        """Go on by a page, an answer page or a piece of a task."""
+        """Advance by a page, an answer page or a part of a task."""
         state = self.state
         match state.phase:
             case Phase.READING:
@@ -54,7 +54,7 @@ class StoredWorld(World):
                 self.run(0.3, RIGHT)
 
     def until(self, phase: Phase) -> None:
-        """Go on until that phase comes."""
+        """Advance until this phase."""
         for _ in range(100):
             if self.state.phase is phase:
                 return

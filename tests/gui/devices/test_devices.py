@@ -1,4 +1,4 @@
-"""What is said of each device, true to what was found, compared with a reviewed text."""
+"""The texts about each device by its backends, compared with a reviewed text."""
 
 import threading
 from collections.abc import Iterator
@@ -52,18 +52,18 @@ WAYS = (
 )
 
 
-def told() -> Iterator[str]:
+def device_lines() -> Iterator[str]:
     for ways in WAYS:
         yield from value_lines(devices_shown(ways), "the best way to a Falcon")
-    shown = devices_shown([MOUSE, falcon("connected: FT1"), EMULATED])
+    listed = devices_shown([MOUSE, falcon("connected: FT1"), EMULATED])
     for name in ("falcon:FT1", "falcon-emulated", "hammer"):
-        yield from value_lines(device_named(name, shown), f"preferred {name}")
+        yield from value_lines(device_named(name, listed), f"preferred {name}")
     assert device_named("falcon", ()) == device_before_search("falcon")
     yield from value_lines(device_before_search("falcon"), "before anybody looked")
 
 
-def test_devices_are_told_as_reviewed() -> None:
-    check_kept(Path(__file__).with_name("devices.txt"), told())
+def test_texts_about_devices_are_as_reviewed() -> None:
+    check_kept(Path(__file__).with_name("devices.txt"), device_lines())
 
 
 def test_every_device_is_shown_once_and_those_that_people_feel_with_first() -> None:
@@ -89,8 +89,8 @@ def test_the_library_that_is_ready_comes_before_one_without_a_device() -> None:
         ((NONE, DRIVER_READY), "Driver ready", False),
         ((READY, "connected: FT1"), "Connected", True),
     ):
-        (shown,) = devices_shown([falcon(states[0]), ftdi(states[1])])
-        assert (shown.word, shown.is_ready) == (word, is_ready)
+        (falcon_shown,) = devices_shown([falcon(states[0]), ftdi(states[1])])
+        assert (falcon_shown.word, falcon_shown.is_ready) == (word, is_ready)
     assert device_before_search("toy-hand:3").icon == device_before_search("falcon").icon == "device"
     assert (device_before_search("mouse").icon, device_before_search("mouse").title) == ("mouse", "Mouse")
 
@@ -103,13 +103,13 @@ def test_the_participants_text_grows_with_the_distance_on_their_screen(monkeypat
 
 @pytest.fixture
 def place(qtbot: Any) -> DevicesPlace:
-    made = DevicesPlace(MachineSettings(device="falcon:FT1"), lambda: [MOUSE, falcon(NONE, "plug it in")])
-    qtbot.addWidget(made)
-    return made
+    devices_place = DevicesPlace(MachineSettings(device="falcon:FT1"), lambda: [MOUSE, falcon(NONE, "plug it in")])
+    qtbot.addWidget(devices_place)
+    return devices_place
 
 
 @pytest.mark.slow
-def test_a_row_states_what_a_device_can_do_and_follows_its_state(qtbot: Any, place: DevicesPlace) -> None:
+def test_a_row_describes_a_device_and_follows_its_state(qtbot: Any, place: DevicesPlace) -> None:
     place.show_devices(devices_shown([MOUSE, *WAYS[2], EMULATED]))
     falcon_row, mouse_row, emulated_row = rows = [place.rows[name] for name in ("falcon", "mouse", "falcon-emulated")]
     assert [row.title.text() for row in rows] == ["Novint Falcon", "Mouse", "Emulated Falcon"]
@@ -161,7 +161,7 @@ def test_devices_are_looked_for_on_request_until_the_windows_close(qtbot: Any, p
     for look in (place.enter, place.refresh.click):
         with qtbot.waitSignal(place.looked):
             look()
-            assert (place.refresh.text(), place.refresh.isEnabled()) == ("Looking …", False)
+            assert (place.refresh.text(), place.refresh.isEnabled()) == ("Looking…", False)
         assert (place.refresh.text(), place.refresh.isEnabled()) == ("Refresh", True)
     assert [(device.name, device.word) for device in place.shown] == [("mouse", "Ready"), ("falcon", "Not connected")]
     assert place.rows["falcon"].title.isChecked()
@@ -196,10 +196,10 @@ def test_devices_are_looked_for_on_request_until_the_windows_close(qtbot: Any, p
 def test_of_several_devices_the_one_with_the_preferred_serial_number_is_examined(
     qtbot: Any, monkeypatch: pytest.MonkeyPatch, preferred: str, examined: str
 ) -> None:
-    asked: list[str] = []
+    names: list[str] = []
 
     def open_diagnosis(window: QWidget, _theme: object, name: str, _settings: object) -> QDialog:
-        asked.append(name)
+        names.append(name)
         return QDialog(window)
 
     monkeypatch.setattr("study_app.gui.devices.view.open_diagnosis", open_diagnosis)
@@ -214,4 +214,4 @@ def test_of_several_devices_the_one_with_the_preferred_serial_number_is_examined
     assert (dialog.isVisible(), place.dialog is dialog) == (False, False)
     place.leave()
     assert place.dialog is None
-    assert asked == [examined] * 2
+    assert names == [examined] * 2

@@ -17,7 +17,7 @@ MS = 1_000_000
 
 
 class Screen:
-    """A clock that is turned by hand; timers go off when their time has come."""
+    """A manual clock whose timers fire when their time has come."""
 
     def __init__(self, refresh_hz):
         self.now_ns = 10**9
@@ -32,7 +32,7 @@ class Screen:
         self.now_ns += self.takes_ns
 
     def run(self, seconds, early_ns=0, late_ns=0):
-        """Let time pass; the timer goes off so early or late."""
+        """Advance the clock; the timer fires early or late by these times."""
         end_ns = self.now_ns + round(seconds * 1e9)
         while self.frames.next_ns < end_ns:
             self.now_ns = max(self.now_ns, self.frames.next_ns - early_ns + late_ns)
@@ -43,14 +43,14 @@ class Screen:
 
 @pytest.fixture(params=[59.94, 144.0])
 def screen(request, qapp):
-    made = Screen(request.param)
-    made.frames.start()
-    made.timer.stop()  # before a late computer lets it go off by itself
-    return made
+    refreshing = Screen(request.param)
+    refreshing.frames.start()
+    refreshing.timer.stop()  # before a late computer lets it go off by itself
+    return refreshing
 
 
 @pytest.mark.parametrize(("early_ns", "late_ns"), [(0, 0), (MS // 2, 0), (0, 3 * MS)])
-def test_a_frame_for_every_refresh_and_no_drift(screen, early_ns, late_ns):
+def test_every_refresh_gets_a_frame_without_drift(screen, early_ns, late_ns):
     began_ns = screen.now_ns
     screen.run(10.0, early_ns, late_ns)
     period_ns = screen.frames.period_ns
@@ -59,23 +59,27 @@ def test_a_frame_for_every_refresh_and_no_drift(screen, early_ns, late_ns):
 
 
 def test_the_timer_of_the_next_frame_runs_before_a_frame_is_drawn(qapp):
-    made, waits_ms = Screen(10.0), []
-    made.frames.start()
-    assert (made.timer.isActive(), made.timer.interval(), made.timer.isSingleShot()) == (True, 100, True)
-    made.frames.due.connect(lambda: waits_ms.append(made.timer.interval()))
+    refreshing, waits_ms = Screen(10.0), []
+    refreshing.frames.start()
+    assert (refreshing.timer.isActive(), refreshing.timer.interval(), refreshing.timer.isSingleShot()) == (
+        True,
+        100,
+        True,
+    )
+    refreshing.frames.due.connect(lambda: waits_ms.append(refreshing.timer.interval()))
     for at_ms in (100, 230, 305):  # on time, late, and late again
-        made.now_ns = 10**9 + at_ms * MS
-        made.timer.timeout.emit()
+        refreshing.now_ns = 10**9 + at_ms * MS
+        refreshing.timer.timeout.emit()
     assert waits_ms == [100, 70, 95]
-    made.now_ns = 10**9 + 340 * MS
-    made.frames.note_swap()  # the next one comes at 440 ms; its frame is drawn 5 ms before it
-    assert (made.timer.isActive(), made.timer.interval()) == (True, 95)
-    made.frames.stop()
-    made.frames.note_swap()
-    assert not made.timer.isActive()
+    refreshing.now_ns = 10**9 + 340 * MS
+    refreshing.frames.note_swap()  # the next one comes at 440 ms; its frame is drawn 5 ms before it
+    assert (refreshing.timer.isActive(), refreshing.timer.interval()) == (True, 95)
+    refreshing.frames.stop()
+    refreshing.frames.note_swap()
+    assert not refreshing.timer.isActive()
 
 
-def test_a_slow_frame_costs_its_own_refreshes_and_no_more(screen):
+def test_a_slow_frame_costs_only_its_own_refreshes(screen):
     screen.run(1.0)
     before = len(screen.drawn_ns)
     screen.takes_ns = round(2.4 * screen.frames.period_ns)
@@ -122,7 +126,7 @@ def test_without_swaps_the_clock_goes_on(screen):
     ],
     ids=["none", "not served", "xcb by name"],
 )
-def test_no_display_is_an_error_that_says_what_to_do_and_what_needs_none(environment):
+def test_a_missing_display_is_reported_with_commands_that_work_without_one(environment):
     with pytest.raises(DisplayError, match="DISPLAY") as refused:
         check_display(environment, "linux")
     assert "\n" not in str(refused.value)

@@ -62,9 +62,9 @@ def screen(name: str, scaling: float = 1.0, refresh_hz: float = 60.0) -> Any:
 
 @pytest.fixture
 def three(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    made = [screen("A"), screen("B", 1.5, 143.8567), screen("C")]
-    monkeypatch.setattr(screens, "QGuiApplication", SimpleNamespace(screens=lambda: made))
-    return made
+    screen_list = [screen("A"), screen("B", 1.5, 143.8567), screen("C")]
+    monkeypatch.setattr(screens, "QGuiApplication", SimpleNamespace(screens=lambda: screen_list))
+    return screen_list
 
 
 def test_the_participant_has_the_chosen_screen_or_the_last_and_the_operator_the_first_other(three: list[Any]) -> None:
@@ -80,11 +80,16 @@ def test_the_participant_has_the_chosen_screen_or_the_last_and_the_operator_the_
 
 
 def test_a_screen_is_described_in_logical_pixels_and_named_in_its_own(three: list[Any]) -> None:
-    shown = screen_shown(three[1])
-    assert (shown.number, shown.name, shown.width_px, shown.height_px) == (2, "B", 1920, 1080)
-    assert (shown.refresh_hz, shown.scaling, shown.width_mm, shown.height_mm) == (143.8567, 1.5, 527, 296)
-    assert shown.words == "2880 × 1620, 144 Hz, 150\u202f%"
-    assert [one.name for one in screens_shown()] == ["A", "B", "C"]
+    described = screen_shown(three[1])
+    assert (described.number, described.name, described.width_px, described.height_px) == (2, "B", 1920, 1080)
+    assert (described.refresh_hz, described.scaling, described.width_mm, described.height_mm) == (
+        143.8567,
+        1.5,
+        527,
+        296,
+    )
+    assert described.words == "2880 × 1620, 144 Hz, 150\u202f%"
+    assert [shown_screen.name for shown_screen in screens_shown()] == ["A", "B", "C"]
     assert describe_screen(three[1]) == {
         "name": "B", "number": 2, "size_px": [1920, 1080], "refresh_hz": 143.857, "scaling": 1.5, "dots_per_inch": 92.5
     }  # fmt: skip
@@ -112,6 +117,8 @@ def test_a_window_is_in_the_middle_or_the_lower_right_corner(qtbot, corner, size
     ("renderer", "has_card"),
     [(None, False), ("NVIDIA GeForce", True), ("llvmpipe (LLVM 15)", False), ("Microsoft Basic Render Driver", False)],
 )
-def test_software_is_no_graphics_card(monkeypatch: pytest.MonkeyPatch, renderer: str | None, has_card: bool) -> None:
+def test_software_rendering_does_not_count_as_a_graphics_card(
+    monkeypatch: pytest.MonkeyPatch, renderer: str | None, has_card: bool
+) -> None:
     monkeypatch.setattr(screens, "opengl_renderer", lambda: renderer)
     assert has_graphics_card() is has_card

@@ -12,7 +12,7 @@ from study_app.gui.help.view import anchor_of, help_entries, matching_entries, p
 def test_every_page_is_listed_once_below_the_heading_of_its_section() -> None:
     rows = help_entries()
     assert sorted(row.page for row in rows) == list(documentation.names())
-    assert [row.page for row in rows if row.heads] == ["index", *documentation.sections()]
+    assert [row.page for row in rows if row.is_heading] == ["index", *documentation.sections()]
     names = [row.page for row in rows]
     assert names.index("begin") < names.index("first-session") < names.index("do")
 
@@ -24,7 +24,7 @@ ASKED = [
 ]
 
 
-@pytest.mark.parametrize(("words", "page", "answer"), [asked[1:] for asked in ASKED], ids=[asked[0] for asked in ASKED])
+@pytest.mark.parametrize(("words", "page", "answer"), [case[1:] for case in ASKED], ids=[case[0] for case in ASKED])
 def test_the_words_of_a_reader_find_the_page_with_the_answer_first(words: str, page: str, answer: str) -> None:
     assert matching_entries(words)[0].page == page
     assert answer in " ".join(documentation.page(page).split())
@@ -36,7 +36,7 @@ def test_a_search_finds_words_that_begin_alike_the_best_page_first_at_its_headin
     assert pages[0] == "photodiode"
     assert "timing" in pages
     assert matching_entries("zebra") == ()
-    assert not any(row.heads for row in matching_entries("photodiode"))
+    assert not any(row.is_heading for row in matching_entries("photodiode"))
     assert (matching_entries("full disks")[0].page, matching_entries("full disks")[0].anchor) == ("year", "a-full-disk")
     assert next(row.page for row in matching_entries("spss")) == "export"  # a list of pages comes after them
 
@@ -56,6 +56,6 @@ def test_texts_have_neither_comments_nor_html_nor_empty_cells() -> None:
         assert "| |" not in text, page
 
 
-def test_anchors_are_those_of_links() -> None:
+def test_anchors_match_those_of_links() -> None:
     assert anchor_of("Tables and report") == "tables-and-report"
     assert anchor_of("“125 ms” & more: a test?") == "125-ms--more-a-test"

@@ -1,4 +1,4 @@
-"""The place Help: links lead to headings, to other pages and outside the program."""
+"""The Help page: links lead to headings, to other pages and outside the program."""
 
 import pytest
 from PySide6.QtCore import Qt, QUrl
@@ -25,8 +25,8 @@ def test_a_link_leads_to_a_heading_of_another_page_and_back_returns(place, qtbot
     place.reader.anchorClicked.emit(QUrl("delays.md#the-whole-delay"))
     assert place.reader.page == "delays"
     top = place.reader.cursorForPosition(place.reader.viewport().rect().topLeft())
-    seen = {top.block().text(), top.block().next().text(), top.block().next().next().text()}
-    assert "The whole delay" in seen
+    top_blocks = {top.block().text(), top.block().next().text(), top.block().next().next().text()}
+    assert "The whole delay" in top_blocks
     assert place.list.currentItem().data(PAGE) == "delays"
     place.reader.anchorClicked.emit(QUrl("no-such-page.md"))
     assert place.reader.page == "delays"
@@ -46,10 +46,10 @@ def test_a_link_on_a_page_of_a_folder_begins_there(place, link, page):
 
 
 def test_an_address_is_opened_outside_the_program(place, monkeypatch):
-    opened = []
-    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    addresses = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", addresses.append)
     place.reader.anchorClicked.emit(QUrl("https://jobqueue.dask.org"))
-    assert opened == [QUrl("https://jobqueue.dask.org")]
+    assert addresses == [QUrl("https://jobqueue.dask.org")]
     assert place.reader.page == "index"
 
 

@@ -28,7 +28,7 @@ def open_home(qtbot, results, size=None):
 
 
 def cell(home, row, heading, role=Qt.ItemDataRole.AccessibleTextRole):
-    """Return what a cell of the table of sessions says."""
+    """Return the text of a cell in the table of sessions."""
     model = home.sessions.rows.table.model()
     across = Qt.Orientation.Horizontal
     column = [model.headerData(at, across) for at in range(model.columnCount())].index(heading)

@@ -1,4 +1,4 @@
-"""What stands for a rehearsal in the tests of its dialog: tasks of a worker process."""
+"""Tasks of a worker process that replace a rehearsal in the tests of its dialog."""
 
 import signal
 import sys

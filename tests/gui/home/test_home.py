@@ -1,4 +1,4 @@
-"""Home: cards, sessions, and the ways into a session, while studies, drafts and files come, change and go."""
+"""Home: cards, sessions and the ways into a session, while studies, drafts and files change."""
 
 import threading
 from datetime import UTC, datetime, timedelta
@@ -47,7 +47,7 @@ def own_study(folder, title="Own"):
 
 
 def changes_of_studies(home, folder, chooses):
-    """Yield what happens to studies and drafts, and what is pressed then."""
+    """Yield changes of studies and drafts, and the clicks that follow."""
     file, fresh = folder / "protocols" / "own.toml", folder / "protocols" / "fresh.toml"
 
     def come_back(act):
@@ -106,8 +106,8 @@ def sessions_come(home, folder, _chooses):
         yield f"show kind {at}", lambda at=at: home.sessions.kind.setCurrentIndex(at)
 
 
-@pytest.mark.parametrize("acts", [changes_of_studies, sessions_come], ids=lambda one: one.__name__)
-def test_home_follows_what_happens(qtbot, tmp_path, monkeypatch, pytestconfig, acts):
+@pytest.mark.parametrize("acts", [changes_of_studies, sessions_come], ids=lambda acts: acts.__name__)
+def test_home_follows_changes_of_files_and_sessions(qtbot, tmp_path, monkeypatch, pytestconfig, acts):
     home = open_home(qtbot, tmp_path / "results")
 
     def settled():
@@ -142,8 +142,8 @@ def test_studies_that_cannot_be_read_are_named_and_the_sessions_stay(qtbot, resu
 def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot, tmp_path, after):
     text = own_study(tmp_path, "Zest").read_text(encoding="utf-8")
     for name in "abcdefgh":
-        made = text.replace('name = "own"', f'name = "{name}"').replace("Zest", f"Study {name}")
-        (tmp_path / "protocols" / f"{name}.toml").write_text(made, encoding="utf-8", newline="\n")
+        content = text.replace('name = "own"', f'name = "{name}"').replace("Zest", f"Study {name}")
+        (tmp_path / "protocols" / f"{name}.toml").write_text(content, encoding="utf-8", newline="\n")
     file = tmp_path / "protocols" / ("own.toml" if after == "saved" else "fresh.toml")
     write_draft(file, Draft(text=text.replace("Zest", "Else"), base=""))
     home = open_home(qtbot, tmp_path / "results")
@@ -168,7 +168,7 @@ def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot
         assert (len(home.grid.cards), held, bar.value()) == (count - 1, home.grid.cards[0], 0)
 
 
-def test_the_height_of_the_cards_is_that_of_their_texts_in_the_present_width(qtbot, tmp_path):
+def test_the_height_of_the_cards_fits_their_texts_at_the_present_width(qtbot, tmp_path):
     grid = type(open_home(qtbot, tmp_path).grid)()
     cards = [label("word " * count, "label", wraps=True) for count in (40, 90)]
     qtbot.addWidget(grid)
@@ -177,10 +177,10 @@ def test_the_height_of_the_cards_is_that_of_their_texts_in_the_present_width(qtb
     grid.show_cards(cards)
     QApplication.processEvents()
     assert grid.whole_height == sum(card.heightForWidth(240) for card in cards) + grid.layout().verticalSpacing()
-    (other,) = made = [label("other", "label")]
-    grid.show_cards(made)
+    (other,) = cards_shown = [label("other", "label")]
+    grid.show_cards(cards_shown)
     assert [grid.layout().indexOf(card) for card in (other, *cards)] == [0, -1, -1]
-    assert grid.cards is made
+    assert grid.cards is cards_shown
 
 
 def test_as_many_cards_as_fit_stand_in_a_row(qtbot):
@@ -203,7 +203,7 @@ def test_as_many_cards_as_fit_stand_in_a_row(qtbot):
         cards[0].setText("word " * 99)
 
 
-def test_each_button_of_a_study_opens_what_it_says(qtbot, tmp_path):
+def test_each_button_of_a_study_opens_its_dialog(qtbot, tmp_path):
     home = open_home(qtbot, tmp_path)
     card = home.grid.cards[0]
     for button, title, kind in (
@@ -212,8 +212,8 @@ def test_each_button_of_a_study_opens_what_it_says(qtbot, tmp_path):
     ):
         assert button.text() == title
         qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
-        dialogs = [one for one in home.main.findChildren(QDialog) if one.isVisible()]
-        assert [type(one) for one in dialogs] == [kind]
+        dialogs = [dialog for dialog in home.main.findChildren(QDialog) if dialog.isVisible()]
+        assert [type(dialog) for dialog in dialogs] == [kind]
         dialogs[0].reject()
 
 
@@ -223,12 +223,12 @@ def test_a_draft_can_be_discarded_from_its_card(qtbot, tmp_path):
     home = open_home(qtbot, tmp_path / "results")
     drafts = [card for card in home.grid.cards if card.bin is not None]
     assert [card.facts.source for card in drafts] == [str(tmp_path / "protocols" / "fresh.toml")]
-    with qtbot.waitSignal(home.discard_asked) as asked:
+    with qtbot.waitSignal(home.discard_asked) as signal:
         qtbot.mouseClick(drafts[0].bin, Qt.MouseButton.LeftButton)
-    assert asked.args == [drafts[0].facts.source]
+    assert signal.args == [drafts[0].facts.source]
 
 
-def test_where_only_samples_exist_sessions_are_one_line_until_they_are_asked_for(qtbot, tmp_path):
+def test_with_only_sample_sessions_the_list_is_one_line_until_requested(qtbot, tmp_path):
     hold(tmp_path / "sample-demo", "P001", simulated=True)
     home = open_home(qtbot, tmp_path)
     card = home.sessions
@@ -274,7 +274,7 @@ def test_no_word_on_sessions_while_they_are_read(qtbot, tmp_path, monkeypatch):
     hold(tmp_path / "demo", "P001")
     reading = threading.Event()
     read = view._read_sessions
-    monkeypatch.setattr(view, "_read_sessions", lambda *given: reading.wait(10) and read(*given))
+    monkeypatch.setattr(view, "_read_sessions", lambda *arguments: reading.wait(10) and read(*arguments))
     home = view.HomePlace(tmp_path)
     qtbot.addWidget(home)
     home.show()
@@ -288,8 +288,8 @@ def test_no_word_on_sessions_while_they_are_read(qtbot, tmp_path, monkeypatch):
 
 
 def test_a_session_is_opened_by_the_keyboard_a_double_click_and_a_button(home, qtbot):
-    table, asked = home.sessions.rows.table, []
-    home.sessions.open_asked.connect(lambda facts: asked.append(facts.participant))
+    table, participants = home.sessions.rows.table, []
+    home.sessions.open_asked.connect(lambda facts: participants.append(facts.participant))
     assert not home.sessions.details.isEnabled()
     table.setFocus()
     qtbot.keyClick(table, Qt.Key.Key_Down)
@@ -298,10 +298,10 @@ def test_a_session_is_opened_by_the_keyboard_a_double_click_and_a_button(home, q
     qtbot.mouseClick(table.viewport(), Qt.MouseButton.LeftButton, pos=middle)
     qtbot.mouseDClick(table.viewport(), Qt.MouseButton.LeftButton, pos=middle)
     qtbot.mouseClick(home.sessions.details, Qt.MouseButton.LeftButton)
-    assert asked == ["P001"] * 3
+    assert participants == ["P001"] * 3
 
 
-def test_the_card_of_sessions_counts_each_kind_and_says_which_ones_it_does_not_show(qtbot):
+def test_the_card_of_sessions_counts_each_kind_and_names_hidden_ones(qtbot):
     now = datetime(2026, 3, 9, 18, 30, tzinfo=UTC)
     facts = [
         SessionFacts(
@@ -325,12 +325,12 @@ def test_the_card_of_sessions_counts_each_kind_and_says_which_ones_it_does_not_s
     others = "Not shown: 2 pilot sessions, 1 simulated session."
     none = {"": "No participant sessions yet. The first session will appear here when it starts.",
             "sample": "No sample sessions."}  # fmt: skip
-    for kind, shown in (("", []), ("pilot", ["P0", "P1"]), ("simulated", ["P2"]), ("sample", [])):
+    for kind, expected in (("", []), ("pilot", ["P0", "P1"]), ("simulated", ["P2"]), ("sample", [])):
         card.show_kind(kind)
-        assert sorted(session.participant for session in card.shown) == shown
-        assert card.rows.isHidden() == card.is_empty == (not shown)
-        assert card.nothing.isHidden() == bool(shown)
-        assert shown or card.nothing.text() == f"{none[kind]} {others}"
+        assert sorted(session.participant for session in card.shown) == expected
+        assert card.rows.isHidden() == card.is_empty == (not expected)
+        assert card.nothing.isHidden() == bool(expected)
+        assert expected or card.nothing.text() == f"{none[kind]} {others}"
         assert not card.details.isEnabled()
     assert emptied == [False, True]
     card.show_sessions(facts[3:], "results", now)
@@ -374,7 +374,7 @@ NOTE = DraftNote("Draft from today 14:02, not saved: Water", "2026-11-20T14:02:0
     ("shipped", "draft", "pen"),
     [(True, None, "Make a copy of Ink"), (False, None, "Edit Ink"), (False, NOTE, "Continue Ink, mine")],
 )
-def test_the_card_of_a_study_says_what_it_is_and_begins_what_its_buttons_name(qtbot, first, shipped, draft, pen):
+def test_the_card_of_a_study_describes_it_and_its_buttons_send_their_requests(qtbot, first, shipped, draft, pen):
     facts = StudyFacts(
         source="/there/mine.toml", protocol=load("demo"), title="Ink", description="Thick or thin.", languages="Dutch",
         extent="2 parts", duration="about 5 min", needs="Mouse; at most 6 N", origin="Copy of demo", draft=draft,
@@ -382,11 +382,11 @@ def test_the_card_of_a_study_says_what_it_is_and_begins_what_its_buttons_name(qt
     card, heard = StudyCard(facts, first=first, shipped=shipped), []
     qtbot.addWidget(card)
     for name in ("edit", "discard", "new_session", "rehearsal"):
-        getattr(card, name).connect(lambda given, name=name: heard.append((name, given is facts)))
+        getattr(card, name).connect(lambda shown_facts, name=name: heard.append((name, shown_facts is facts)))
     assert card.origin.whole == "Copy of demo  ·  mine.toml"
-    told = [text for text in texts_of(card) if text not in ("", card.origin.text())]
+    texts = [text for text in texts_of(card) if text not in ("", card.origin.text())]
     what = "Thick or thin." if draft is None else f"{NOTE.words}. Sessions use the saved file."
-    assert sorted(told) == sorted(["Ink", what, "2 parts", "about 5 min  ·  Dutch", "Mouse; at most 6 N"])
+    assert sorted(texts) == sorted(["Ink", what, "2 parts", "about 5 min  ·  Dutch", "Mouse; at most 6 N"])
     assert [icon.name for icon in card.findChildren(Icon)] == ["layers", "clock", "device"]
     assert (card.draft.isHidden(), card.bin is None) == (draft is None, draft is None)
     assert card.pen.accessibleName() == pen
@@ -397,14 +397,14 @@ def test_the_card_of_a_study_says_what_it_is_and_begins_what_its_buttons_name(qt
         assert card.pen.toolTip() == pen.removesuffix(" of Ink").removesuffix(" Ink")
     else:
         assert (card.pen.text(), card.pen.role) == ("Continue", "primary" if first else "")
-        assert card.bin.accessibleName() == "Discard the draft of Ink, mine …"
+        assert card.bin.accessibleName() == "Discard the draft of Ink, mine…"
         card.bin.click()
     for button in (card.pen, card.new, card.rehearse):
         button.click()
     assert heard == [*[("discard", True)] * bool(draft), ("edit", True), ("new_session", True), ("rehearsal", True)]
 
 
-def test_the_card_of_a_file_that_cannot_be_run_says_why(qtbot):
+def test_the_card_of_a_broken_file_states_the_reason(qtbot):
     broken = BrokenFacts(source="/there/mine.toml", problem="No format.", origin="Own study", draft=None)
     fresh = DraftFacts(source="/there/mine.toml", title="Ink", origin="Own study", draft=NOTE)
     file, draft = cards = BrokenCard(broken), BrokenCard(fresh, first=True)
@@ -437,7 +437,7 @@ def test_the_banner_resumes_the_session_that_it_names(qtbot):
     assert banner.isHidden()
 
 
-def test_home_says_which_screen_is_the_participants(home, monkeypatch):
+def test_home_names_the_screen_of_the_participant(home, monkeypatch):
     monkeypatch.setattr(view, "screens_shown", lambda: SCREENS)
     for name, numbers in (
         ("DP-1", ("Screen 1", "Participant's screen 2")),
@@ -477,7 +477,7 @@ def test_an_interrupted_session_goes_on_with_the_settings_of_this_machine(qtbot,
     assert heard.args[0] == "The session cannot be resumed"
 
 
-def test_home_asks_for_what_its_dialogs_and_buttons_name(home, qtbot, tmp_path, monkeypatch):
+def test_dialogs_and_buttons_of_home_send_their_requests(home, qtbot, tmp_path, monkeypatch):
     card = next(card for card in home.grid.cards if card.facts.source == "demo")
     assert card.held.text() == "1 session, 1 complete"
     card.rehearse.click()

@@ -1,4 +1,4 @@
-"""The main window: places are made when one goes there, entered and left; the rail tells where one is."""
+"""The main window: pages are created on the first visit, entered and left; the rail marks the present one."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from study_app.gui.widgets.main_view import Place
 
 
 class Room(Place):
-    """A place that remembers when it was entered and left."""
+    """A page that records when it was entered and left."""
 
     def __init__(self, name, log):
         super().__init__()
@@ -61,7 +61,7 @@ def test_one_begins_at_the_first_place_goes_by_the_rail_and_a_session_and_the_en
     assert "leave lab" in log[-2:]
 
 
-def test_what_a_place_says_is_shown_until_one_leaves_it_and_after_a_session(main):
+def test_a_message_of_a_page_is_shown_until_it_is_left_and_again_after_a_session(main):
     main.place("home").go_asked.emit("devices")
     assert main.here == "devices"
     main.place("devices").message.emit("It did not work", "The cable is out.")
@@ -97,7 +97,7 @@ def test_the_rail_leads_to_the_places_that_there_are(qtbot):
     )  # fmt: skip
 
 
-def test_places_are_reached_and_the_window_is_closed_by_the_keyboard_alone(main, qtbot):
+def test_all_pages_and_closing_are_reachable_by_keyboard(main, qtbot):
     for key, place in ((Qt.Key.Key_Space, "designer"), (Qt.Key.Key_Return, "results")):
         main.rail.buttons[main.here].setFocus()
         qtbot.keyClick(main.focusWidget(), Qt.Key.Key_Tab)
@@ -176,9 +176,9 @@ def other_buttons(notice):
     return [button for button in notice.findChildren(ActionButton) if button not in named]
 
 
-def test_a_message_opens_its_file_and_closes_once_its_own_place_says_so(main, monkeypatch):
-    opened = []
-    monkeypatch.setattr("study_app.gui.home.main_window.open_here", opened.append)
+def test_a_message_opens_its_file_and_closes_on_request_of_its_page(main, monkeypatch):
+    files = []
+    monkeypatch.setattr("study_app.gui.home.main_window.open_here", files.append)
     home, lab = main.place("home"), main.place("lab")
     home.file_message.emit("Written", "It is here.", Path("report.html"))
     notice = main.notice
@@ -191,7 +191,7 @@ def test_a_message_opens_its_file_and_closes_once_its_own_place_says_so(main, mo
     assert not notice.isVisible()
     home.file_message.emit("Written", "It is here.", Path("report.html"))
     other_buttons(main.notice)[0].click()
-    assert opened == [Path("report.html")]
+    assert files == [Path("report.html")]
     lab.message.emit("Saved", "There.")
     assert (main.notice.windowTitle(), main.notice.said.text(), other_buttons(main.notice)) == ("Saved", "There.", [])
     main.notice.accept()
@@ -199,7 +199,7 @@ def test_a_message_opens_its_file_and_closes_once_its_own_place_says_so(main, mo
 
 def test_a_failed_device_is_tried_again_or_diagnosed(main):
     said = []
-    for diagnose, names in ((lambda: said.append("diagnose"), ["Diagnose …"]), (None, [])):
+    for diagnose, names in ((lambda: said.append("diagnose"), ["Diagnose…"]), (None, [])):
         main.ask_about_device("Not found", "Plug it in.", lambda: said.append("retry"), diagnose)
         notice = main.notice
         assert (notice.windowTitle(), notice.said.text()) == ("Not found", "Plug it in.")
@@ -214,7 +214,7 @@ def test_a_failed_device_is_tried_again_or_diagnosed(main):
     assert said == ["diagnose", "retry", "retry"]
 
 
-def test_a_place_that_cannot_be_opened_says_why_and_is_tried_again(main, log):
+def test_a_page_that_fails_to_open_states_the_reason_and_is_retried(main, log):
     def fail():
         raise StudyError("the folder is gone")
 

@@ -20,8 +20,8 @@ LEFT = Qt.MouseButton.LeftButton
 
 
 @pytest.fixture
-def opened(qtbot: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], RehearsalDialog]:
-    """Return a function that opens the dialog for a task that stands for the rehearsal."""
+def open_dialog(qtbot: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], RehearsalDialog]:
+    """Return a function that opens the dialog with a task in place of the rehearsal."""
 
     def open_(task: str = "endless") -> RehearsalDialog:
         dialog = RehearsalDialog(study_facts("demo"), tmp_path)
@@ -42,15 +42,15 @@ def opened(qtbot: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> Callab
         ("", "no more processes"),
     ],
 )
-def test_a_failed_rehearsal_says_why_and_stays(
-    qtbot: Any, opened: Any, monkeypatch: pytest.MonkeyPatch, task: str, said: str
+def test_a_failed_rehearsal_states_the_reason_and_stays_open(
+    qtbot: Any, open_dialog: Any, monkeypatch: pytest.MonkeyPatch, task: str, said: str
 ) -> None:
     def none(*_args: Any, **_named: Any) -> None:
         raise OSError("no more processes")
 
     if not task:
         monkeypatch.setattr(dialogs, "WorkerClient", none)
-    dialog = opened(task)
+    dialog = open_dialog(task)
     qtbot.mouseClick(dialog.go_on, LEFT)
     qtbot.waitUntil(lambda: dialog.said.text() == said, timeout=20_000)
     assert dialog.editors["participants"].isVisible(), "it can be tried again"
@@ -58,8 +58,8 @@ def test_a_failed_rehearsal_says_why_and_stays(
     assert not dialog.isVisible()
 
 
-def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot: Any, opened: Any) -> None:
-    dialog = opened("two")
+def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot: Any, open_dialog: Any) -> None:
+    dialog = open_dialog("two")
     dialog.editors["participants"].show_value(2)
     qtbot.mouseClick(dialog.go_on, LEFT)
     qtbot.waitUntil(lambda: dialog.bar.value() == STEPS // 2, timeout=20_000)
@@ -75,17 +75,17 @@ def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot: Any, op
 
 
 def test_the_rehearsal_gets_the_answers_and_an_own_folder(
-    qtbot: Any, tmp_path: Any, opened: Any, monkeypatch: pytest.MonkeyPatch
+    qtbot: Any, tmp_path: Any, open_dialog: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[Any] = []
+    calls: list[Any] = []
 
     def client(task: str, *, name: str) -> Any:
-        asked.append((task, name))
-        idle = {"answers": list, "close": lambda: asked.append("close"), "wait_until_ended": bool, "ended": True}
-        return SimpleNamespace(order=asked.append, **idle)
+        calls.append((task, name))
+        idle = {"answers": list, "close": lambda: calls.append("close"), "wait_until_ended": bool, "ended": True}
+        return SimpleNamespace(order=calls.append, **idle)
 
     (tmp_path / "demo-rehearsal-1").mkdir()
-    dialog = opened()
+    dialog = open_dialog()
     monkeypatch.setattr(dialogs, "WorkerClient", client)
     texts = [part.text() for part in dialog.findChildren(QLabel)]
     about = f"The sessions are marked as simulated and stored separately in {tmp_path / 'demo-rehearsal-2'}."
@@ -97,17 +97,17 @@ def test_the_rehearsal_gets_the_answers_and_an_own_folder(
     dialog.editors["seed"].show_value(9)
     qtbot.mouseClick(dialog.go_on, LEFT)
     order = RehearsalOrder("demo", 3, 9, tmp_path / "demo-rehearsal-2")
-    assert asked == [(dialogs.TASK, "rehearsal"), order]
-    assert dialog.said.text() == "0 of 3: rehearsing …"
+    assert calls == [(dialogs.TASK, "rehearsal"), order]
+    assert dialog.said.text() == "0 of 3: rehearsing…"
     dialog.end()
-    assert (asked[2:], dialog.working) == (["close"], False)
+    assert (calls[2:], dialog.working) == (["close"], False)
 
 
 @pytest.mark.parametrize("at", ["participants", "seed", "go_on", "dialog"])
 def test_enter_begins_the_rehearsal_wherever_the_keyboard_is_and_the_end_of_the_program_ends_it(
-    qtbot: Any, opened: Any, at: str
+    qtbot: Any, open_dialog: Any, at: str
 ) -> None:
-    dialog = opened()
+    dialog = open_dialog()
     pressed = {"dialog": dialog, "go_on": dialog.go_on}.get(at) or dialog.editors[at].control
     pressed.setFocus()
     qtbot.keyClick(pressed, Qt.Key.Key_Return)
@@ -116,8 +116,8 @@ def test_enter_begins_the_rehearsal_wherever_the_keyboard_is_and_the_end_of_the_
     assert dialog.worker.ended
 
 
-def test_the_number_is_selected_and_the_first_compilation_is_explained(qtbot: Any, opened: Any) -> None:
-    dialog = opened("compiles")
+def test_the_number_is_selected_and_the_first_compilation_is_explained(qtbot: Any, open_dialog: Any) -> None:
+    dialog = open_dialog("compiles")
     count = dialog.editors["participants"].control
     qtbot.waitUntil(lambda: dialog.focusWidget() is count and count.lineEdit().selectedText() == "5")
     qtbot.keyClicks(count, "3")
@@ -128,13 +128,13 @@ def test_the_number_is_selected_and_the_first_compilation_is_explained(qtbot: An
     dialog.end()
 
 
-def test_cancel_closes_the_dialog_and_stops_a_rehearsal(qtbot: Any, opened: Any) -> None:
-    dialog = opened()
+def test_cancel_closes_the_dialog_and_stops_a_rehearsal(qtbot: Any, open_dialog: Any) -> None:
+    dialog = open_dialog()
     dialog.back.setFocus()
     qtbot.keyClick(dialog.back, Qt.Key.Key_Return)
     assert not dialog.isVisible()
     assert dialog.worker is None
-    dialog = opened()
+    dialog = open_dialog()
     qtbot.mouseClick(dialog.go_on, LEFT)
     assert dialog.worker.works
     with qtbot.waitSignal(dialog.rejected):
@@ -144,8 +144,10 @@ def test_cancel_closes_the_dialog_and_stops_a_rehearsal(qtbot: Any, opened: Any)
     assert not dialog.isVisible()
 
 
-def test_a_rehearsal_that_does_not_listen_is_killed(qtbot: Any, opened: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    dialog = opened("deaf")
+def test_a_rehearsal_that_does_not_listen_is_killed(
+    qtbot: Any, open_dialog: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialog = open_dialog("deaf")
     monkeypatch.setattr("study_app.workers.client.PATIENCE_S", 0.05)
     dialog.go_on.click()
     qtbot.waitUntil(lambda: dialog.said.text() == "1 of 5: deaf", timeout=20_000)

@@ -54,14 +54,14 @@ from tests.protocol.groups.grouped import GROUPS, STUDY
 pytestmark = pytest.mark.slow
 
 
-def begun(results, participant, source="demo", *, device="mouse", **given):
+def begin_demo(results, participant, source="demo", *, device="mouse", **start_values):
     """Begin a session of the demo, or of a copy of it."""
     where = results / "demo", participant, source
-    return load(source), studies.begun(*where, operator="AK", device={"name": device}, **given)
+    return load(source), studies.begun(*where, operator="AK", device={"name": device}, **start_values)
 
 
 def start(results, participant, status=None, **how):
-    _, store = begun(results, participant, device="scripted", **how)
+    _, store = begin_demo(results, participant, device="scripted", **how)
     if status is None:
         store.close()
     else:
@@ -69,15 +69,15 @@ def start(results, participant, status=None, **how):
 
 
 def stop_at(results, participant, steps, *, screens=None, source="demo", then=()):
-    """Leave a session unfinished after so many steps of its schedule, or in the middle of the next one."""
-    protocol, store = begun(results, participant, source, screens=screens or {"participant": {}})
+    """Leave a session unfinished after this number of steps, or in the middle of the next one."""
+    protocol, store = begin_demo(results, participant, source, screens=screens or {"participant": {}})
     for step in build_schedule(protocol, participant, 1).steps[:steps]:
         if isinstance(step, PageStep):
             store.append(journal_events.PageShown(page=step.page_id))
             store.append(journal_events.PageLeft(page=step.page_id))
             continue
-        told = {name: getattr(step, name) for name in ("block", "phase", "part", "index", "of", "code")}
-        store.append(journal_events.TrialStarted(trial=step.number, attempt=1, **told))
+        trial_fields = {name: getattr(step, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        store.append(journal_events.TrialStarted(trial=step.number, attempt=1, **trial_fields))
         store.append(event_of("trial_ended", trial=step.number, attempt=1, outcome="complete"))
         answer = {"value": 4, "onset_s": 1, "first_s": 1, "last_s": 1, "changes": 0}
         rows = [{"item": item, "number": number, **answer} for number, item in enumerate(step.items, 1)]
@@ -87,21 +87,21 @@ def stop_at(results, participant, steps, *, screens=None, source="demo", then=()
     store.close()
 
 
-def told(folder: Path) -> Iterator[str]:
-    """Yield what is said of each session in a folder of results, of all together, and which ones each filter shows."""
-    found, now = sessions(folder, {"demo": 8}), datetime.now().astimezone()
-    for row in found:
+def session_lines(folder: Path) -> Iterator[str]:
+    """Yield the texts about each session in a folder of results, their counts, and the sessions of each filter."""
+    rows, now = sessions(folder, {"demo": 8}), datetime.now().astimezone()
+    for row in rows:
         chips = f"{status_chip(row)[2]}, {validity_chip(row)[2]}; {incidents_text(row)}"
         yield f"{row.participant} {row.kind} {row.status}: {chips}; {row.answers} of {row.answers_of}; {row.excluded}"
     for study in ("demo", "rek2024"):
-        yield f"{study}: {session_counts_text(found, study)}"
-    yield from (f"{words}: {[one.participant for one in found if session_filter('', state)(one)]}" for state, words in
-                occurring_states(found))  # fmt: skip
-    offered = interrupted_session(found, [study_facts("rek2024"), study_facts("demo")], now)
+        yield f"{study}: {session_counts_text(rows, study)}"
+    yield from (f"{words}: {[row.participant for row in rows if session_filter('', state)(row)]}" for state, words in
+                occurring_states(rows))  # fmt: skip
+    offered = interrupted_session(rows, [study_facts("rek2024"), study_facts("demo")], now)
     if offered is not None:
         yield f"go on with {offered.source}: {offered.heading}; {offered.line}"
         assert offered.folder == folder / "demo" / "data" / f"sub-{offered.participant}" / "ses-01"
-    assert interrupted_session(found, [], now) is None
+    assert interrupted_session(rows, [], now) is None
 
 
 def test_the_extent_of_a_study_counts_its_parts_trials_and_answers(monkeypatch):
@@ -110,19 +110,19 @@ def test_the_extent_of_a_study_counts_its_parts_trials_and_answers(monkeypatch):
     assert study_facts("demo").extent == "2 to 3 parts, 17 trials, 5 to 23 answers"
 
 
-def test_sessions_are_told_as_they_were_held(tmp_path):
+def test_sessions_are_described_as_they_were_held(tmp_path):
     lines = []
     for steps in (0, 1, 2, 4, 7):
         stop_at(tmp_path / str(steps), "P006", steps)
-        lines += [f"== stopped after {steps} steps", *told(tmp_path / str(steps))]
+        lines += [f"== stopped after {steps} steps", *session_lines(tmp_path / str(steps))]
     for number, status in enumerate(("completed", None, "withdrawn", "completed", "completed"), 1):
         start(tmp_path, f"P{number:03}", status)
     start(tmp_path, "P010", "completed", pilot=True)
     start(tmp_path / "rehearsed", "P011", "completed", pilot=True, simulated=True)
     start(tmp_path / "rehearsed", "P012", "completed", simulated=True)
-    lines += ["== simulated", *told(tmp_path / "rehearsed")]
+    lines += ["== simulated", *session_lines(tmp_path / "rehearsed")]
     stop_at(tmp_path, "P013", 2, screens=dict(REHEARSED_SCREENS))
-    lines += ["== a rehearsal that stopped", *told(tmp_path)]
+    lines += ["== a rehearsal that stopped", *session_lines(tmp_path)]
     lost = {"trial": 1, "attempt": 1, "reason": "the disk is full"}
     for participant, then in (
         ("P020", [("recording_lost", lost), ("device_reconnected", {"device": "mouse", "described": {}})]),
@@ -141,15 +141,17 @@ def test_sessions_are_told_as_they_were_held(tmp_path):
     holiday = tmp_path / "holiday" / "data" / "sub-x" / "ses-01"
     holiday.mkdir(parents=True)
     (holiday / "journal.jsonl").write_text("[]\nno journal\n", encoding="utf-8", newline="\n")
-    lines += ["== all", *told(tmp_path)]
+    lines += ["== all", *session_lines(tmp_path)]
     lines += [read_record(tmp_path / "demo" / "data" / "sub-P020" / "ses-01").about]
     opening = lock_folder(tmp_path / "demo" / "data" / "sub-P022" / "ses-01")
-    lines += ["== P022 is open in a program", *told(tmp_path)]
+    lines += ["== P022 is open in a program", *session_lines(tmp_path)]
     opening.release()
     (tmp_path / "demo" / "exclusions.csv").write_text("nonsense", encoding="utf-8", newline="\n")
-    lines += ["== exclusions that cannot be read", *told(tmp_path)]
-    found = (re.sub(r"Today \d\d:\d\d", "Today HH:MM", line.replace(str(tmp_path), "FOLDER")) for line in lines)
-    check_kept(Path(__file__).with_name("sessions.txt"), found)
+    lines += ["== exclusions that cannot be read", *session_lines(tmp_path)]
+    reviewed_lines = (
+        re.sub(r"Today \d\d:\d\d", "Today HH:MM", line.replace(str(tmp_path), "FOLDER")) for line in lines
+    )
+    check_kept(Path(__file__).with_name("sessions.txt"), reviewed_lines)
 
 
 def test_studies_state_extent_languages_needs_and_the_first_problem(tmp_path):
@@ -161,8 +163,8 @@ def test_studies_state_extent_languages_needs_and_the_first_problem(tmp_path):
         facts = study_facts(source)
         names = ("problem",) if isinstance(facts, BrokenFacts) else ("extent", "duration", "languages", "needs")
         lines += [f"== {Path(source).stem}", *value_lines({name: getattr(facts, name) for name in names})]
-    found = (line.replace(str(tmp_path), "FOLDER") for line in lines)
-    check_kept(Path(__file__).with_name("studies.txt"), found)
+    reviewed_lines = (line.replace(str(tmp_path), "FOLDER") for line in lines)
+    check_kept(Path(__file__).with_name("studies.txt"), reviewed_lines)
 
 
 def test_a_session_of_a_study_whose_liquid_file_is_lost_is_offered(tmp_path):
@@ -182,7 +184,7 @@ def test_a_session_of_a_study_whose_liquid_file_is_lost_is_offered(tmp_path):
     assert interrupted_session(sessions(results, {}), [broken, study_facts("demo")], now) == whole
 
 
-def test_times_are_said_as_people_say_them():
+def test_times_are_written_as_people_say_them():
     now = datetime(2024, 11, 20, 15, 0).astimezone()
     assert start_time_text(now, now) == "Today 15:00"
     assert start_time_text(now - timedelta(hours=20), now) == "Yesterday 19:00"
@@ -195,8 +197,8 @@ def test_times_are_said_as_people_say_them():
 
 def test_the_study_that_was_run_last_comes_after_the_opened_ones_and_the_demo_before_any_session(tmp_path, monkeypatch):
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    opened, results = tmp_path / "opened.toml", tmp_path / "results"
-    opened.write_text(source_bytes("demo").decode().replace('"demo"', '"mine"', 1), encoding="utf-8", newline="\n")
+    opened_file, results = tmp_path / "opened.toml", tmp_path / "results"
+    opened_file.write_text(source_bytes("demo").decode().replace('"demo"', '"mine"', 1), encoding="utf-8", newline="\n")
     results.mkdir()
     names = {None: "rek2024", results: "demo"}
     assert {folder: read_studies((), results=folder)[0].name for folder in names} == names
@@ -206,13 +208,13 @@ def test_the_study_that_was_run_last_comes_after_the_opened_ones_and_the_demo_be
         os.utime(session / "journal.jsonl", (written_s, written_s))
         assert last_written_ns(session) == written_s * 10**9
     assert last_written_ns(results) == 0
-    facts = read_studies((str(opened),), results=results)
-    assert [study.source for study in facts[:3]] == [str(opened), "slime", "rek2024"]
+    facts = read_studies((str(opened_file),), results=results)
+    assert [study.source for study in facts[:3]] == [str(opened_file), "slime", "rek2024"]
     assert [study.name for study in facts[:2]] == ["mine", "slime"]
-    assert [study.source for study in facts].count(str(opened)) == 1
+    assert [study.source for study in facts].count(str(opened_file)) == 1
 
 
-def test_a_card_states_what_a_study_needs_and_where_it_comes_from(tmp_path, monkeypatch):
+def test_a_card_states_the_requirements_and_origin_of_a_study(tmp_path, monkeypatch):
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     (tmp_path / "protocols").mkdir()
     own = tmp_path / "protocols" / "own.toml"
@@ -231,24 +233,24 @@ def test_a_card_states_what_a_study_needs_and_where_it_comes_from(tmp_path, monk
 
 def test_a_changed_file_changes_the_states_of_the_files(tmp_path, monkeypatch):
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    protocols, opened = tmp_path / "protocols", tmp_path / "opened.toml"
+    protocols, opened_file = tmp_path / "protocols", tmp_path / "opened.toml"
     protocols.mkdir()
-    seen = [file_states([str(opened)])]
+    states = [file_states([str(opened_file)])]
     for act in (
-        lambda: opened.write_bytes(b"x"),
-        lambda: os.utime(opened, ns=(5, 7)),
-        lambda: (opened.write_bytes(b"xy"), os.utime(opened, ns=(5, 7))),
+        lambda: opened_file.write_bytes(b"x"),
+        lambda: os.utime(opened_file, ns=(5, 7)),
+        lambda: (opened_file.write_bytes(b"xy"), os.utime(opened_file, ns=(5, 7))),
         lambda: (protocols / "own.toml").write_bytes(b"abc"),
         lambda: write_draft(protocols / "fresh.toml", Draft(text="a", base="")),
     ):
         act()
-        seen.append(file_states([str(opened)]))
-    assert len(set(seen)) == len(seen) == 6
-    assert [len(states) for states in seen] == [0, 1, 1, 1, 2, 3]
-    assert (opened, 7, 2) in seen[-1]
+        states.append(file_states([str(opened_file)]))
+    assert len(set(states)) == len(states) == 6
+    assert [len(states) for states in states] == [0, 1, 1, 1, 2, 3]
+    assert (opened_file, 7, 2) in states[-1]
 
 
-def test_the_time_of_a_draft_is_said_with_its_day_unless_it_is_today(monkeypatch) -> None:
+def test_the_time_of_a_draft_includes_its_day_unless_it_is_today(monkeypatch) -> None:
     now = datetime(2024, 11, 20, 18, 0).astimezone()
     monkeypatch.setattr("study_app.gui.home.study_facts.time", SimpleNamespace(time=now.timestamp))
     moments = (now.replace(hour=9, minute=5), now.replace(day=19, hour=23), now.replace(year=2023))
@@ -272,18 +274,18 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
         (kept,) = (file for file in draft_files() if f"{name}.toml" in file.read_text(encoding="utf-8"))
         kept.write_text(json.dumps(json.loads(kept.read_bytes()) | {"kept_at": at}), encoding="utf-8", newline="\n")
     keep_original(protocols / "older.toml", "demo")
-    found = read_studies((), lambda: version_rows)
-    assert [(Path(it.source).stem, it.origin) for it in found[2:5]] == [
+    studies_found = read_studies((), lambda: version_rows)
+    assert [(Path(it.source).stem, it.origin) for it in studies_found[2:5]] == [
         ("newer", "Own study"),
         ("older", "Copy of demo"),
         ("saved", "Own study"),
     ]
-    assert {Path(it.source).stem for it in found[:2]} == {"fresh", "broken"}
-    assert found[3].draft.words.endswith(", not saved: Device")
-    (fresh,) = (it for it in found if Path(it.source).stem == "fresh")
+    assert {Path(it.source).stem for it in studies_found[:2]} == {"fresh", "broken"}
+    assert studies_found[3].draft.words.endswith(", not saved: Device")
+    (fresh,) = (it for it in studies_found if Path(it.source).stem == "fresh")
     assert (fresh.title, fresh.origin, fresh.draft.words[-13:]) == ("Fresh", "Own study", ", never saved")
-    assert [it.draft for it in found[4:]] == [None] * len(found[4:])
-    assert {it.origin for it in found[5:]} == {"Shipped study"}
+    assert [it.draft for it in studies_found[4:]] == [None] * len(studies_found[4:])
+    assert {it.origin for it in studies_found[5:]} == {"Shipped study"}
 
 
 def test_a_file_of_liquids_that_becomes_a_study_is_noticed(tmp_path: Path) -> None:

@@ -22,10 +22,10 @@ from study_app.gui.widgets.controls import ActionButton
 def test_keys_are_named_as_on_a_keyboard() -> None:
     assert (key_cap("duplicate"), key_cap("redo"), key_cap("leave page")) == ("Ctrl D", "Ctrl Shift Z", "Esc")
     assert keys_of("redo") == ("Ctrl+Shift+Z", "Ctrl+Y")
-    assert (command_tip("open"), with_key("Open it", "open")) == ("Open file … (Ctrl+O)", "Open it (Ctrl+O)")
+    assert (command_tip("open"), with_key("Open it", "open")) == ("Open file… (Ctrl+O)", "Open it (Ctrl+O)")
     assert Command("a", "A", ("Escape", "Ctrl+Return"), held=True).key_labels == ("hold Esc", "hold Ctrl+Enter")
     rows = keys_markdown().splitlines()
-    assert rows[:2] == ["| key | does |", "| --- | --- |"]
+    assert rows[:2] == ["| key | action |", "| --- | --- |"]
     for row in (
         "| Ctrl+Shift+Z, Ctrl+Y | Redo |",
         "| Del | Delete (outline, lists) |",

@@ -1,4 +1,4 @@
-"""Forms made from descriptions: what each kind of field shows, takes and hands on; questions and work with fields."""
+"""Forms built from descriptions: display, input and signals of each kind of field; questions with fields."""
 
 from pathlib import Path
 from typing import Any
@@ -17,16 +17,16 @@ SIZES = {"s": "Small", "m": "Medium", "l": "Large"}
 
 
 class Heard:
-    """An editor and what it tells."""
+    """An editor and its recorded signals."""
 
-    def __init__(self, qtbot: Any, field: Field, **given: Any) -> None:
-        self.qtbot, self.editor = qtbot, Editor(field, **given)
+    def __init__(self, qtbot: Any, field: Field, **options: Any) -> None:
+        self.qtbot, self.editor = qtbot, Editor(field, **options)
         qtbot.addWidget(self.editor)
         self.editor.show()
         self.control: Any = self.editor.control
         self.changed: list[tuple[str, Any]] = []
         self.edited: list[str] = []
-        self.editor.changed.connect(lambda *given: self.changed.append(given))
+        self.editor.changed.connect(lambda *change: self.changed.append(change))
         self.editor.edited.connect(self.edited.append)
 
     def type(self, text: str, key: Qt.Key = ENTER) -> None:
@@ -35,7 +35,7 @@ class Heard:
         self.qtbot.keyClick(self.control, key)
 
 
-def test_a_number_is_taken_within_its_limits_and_shown_with_its_decimals(qtbot: Any) -> None:
+def test_a_number_is_accepted_within_its_limits_and_shown_with_its_decimals(qtbot: Any) -> None:
     heard = Heard(qtbot, number_field("mean", "Mean", "ms", (0.5, 500.0), 2))
     editor, below = heard.editor, heard.editor.below
     assert heard.control.accessibleName() == "Mean in ms"
@@ -123,14 +123,14 @@ def test_a_count_keeps_to_its_limits_and_a_line_to_its_length(qtbot: Any) -> Non
         _ = judged.editor.value
 
 
-@pytest.mark.parametrize(("kind", "button"), [("file", "Choose …"), ("folder", "Change …")])
+@pytest.mark.parametrize(("kind", "button"), [("file", "Choose…"), ("folder", "Change…")])
 def test_a_path_is_chosen_by_its_button(qtbot: Any, monkeypatch: pytest.MonkeyPatch, kind: Any, button: str) -> None:
-    asked, chosen = [], iter(["", str(Path("/new"))])
+    dialogs, chosen = [], iter(["", str(Path("/new"))])
     for name, answer in (("getOpenFileName", lambda path: (path, "")), ("getExistingDirectory", str)):
         monkeypatch.setattr(
             QFileDialog,
             name,
-            lambda *given, name=name, answer=answer: asked.append((name, *given[1:])) or answer(next(chosen)),
+            lambda *arguments, name=name, answer=answer: dialogs.append((name, *arguments[1:])) or answer(next(chosen)),
         )
     heard = Heard(qtbot, Field("path", "Firmware", kind, file_filter="Binaries (*.bin)"))
     heard.editor.show_value("/old")
@@ -141,7 +141,7 @@ def test_a_path_is_chosen_by_its_button(qtbot: Any, monkeypatch: pytest.MonkeyPa
     choose.click()
     assert (heard.control.text(), heard.changed) == (str(Path("/new")), [("path", str(Path("/new")))])
     words = ("getOpenFileName", "Firmware", "/old", "Binaries (*.bin)")
-    assert asked == [words if kind == "file" else ("getExistingDirectory", *words[1:3])] * 2
+    assert dialogs == [words if kind == "file" else ("getExistingDirectory", *words[1:3])] * 2
 
 
 def test_a_typed_file_must_be_there(tmp_path: Path) -> None:
@@ -155,13 +155,13 @@ def test_a_typed_file_must_be_there(tmp_path: Path) -> None:
 
 @pytest.fixture
 def parent(qtbot: Any) -> QWidget:
-    made = QWidget()
-    qtbot.addWidget(made)
-    made.show()
-    return made
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    widget.show()
+    return widget
 
 
-def test_a_question_waits_for_what_it_needs(qtbot: Any, parent: QWidget) -> None:
+def test_a_question_stays_open_until_its_required_fields_are_filled(qtbot: Any, parent: QWidget) -> None:
     seed, reason = seed_field(), Field("reason", "Reason")
     other = ActionButton("", "Diagnose")
     dialog = Question(
@@ -207,7 +207,7 @@ def test_work_is_shown_until_it_ends_is_refused_or_stops(qtbot: Any, parent: QWi
     assert (dialog.isModal(), dialog.bar.isHidden(), dialog.working, dialog.over) == (True, True, False, False)
     dialog.go_on.click()
     dialog.accept()
-    assert (heard, dialog.said.text()) == (["begun"], "Beginning …")
+    assert (heard, dialog.said.text()) == (["begun"], "Beginning…")
     assert [part.isHidden() for part in (field, dialog.go_on, dialog.bar)] == [True, True, False]
     assert dialog.bar.maximum() == 0
     dialog.show_progress("1 of 4", 0.25)
@@ -219,7 +219,7 @@ def test_work_is_shown_until_it_ends_is_refused_or_stops(qtbot: Any, parent: QWi
     assert (heard, dialog.said.property("role")) == (["begun"] * 2, "text2")
     dialog.back.click()
     dialog.reject()
-    assert (heard[2:], dialog.said.text(), dialog.back.isEnabled()) == (["stop_asked"], "Stopping …", False)
+    assert (heard[2:], dialog.said.text(), dialog.back.isEnabled()) == (["stop_asked"], "Stopping…", False)
     dialog.show_done("Written.", "Open")
     assert (dialog.go_on.text(), dialog.back.text(), dialog.back.isEnabled()) == ("Open", "Close", True)
     assert (dialog.said.text(), dialog.bar.isHidden(), dialog.go_on.isHidden()) == ("Written.", True, False)
@@ -234,9 +234,11 @@ def test_work_is_shown_until_it_ends_is_refused_or_stops(qtbot: Any, parent: QWi
     assert (heard[6:], dialog.isVisible()) == (["rejected"], False)
 
 
-def test_a_protocol_is_asked_for_in_the_workspace(parent: QWidget, tmp_path: Path, monkeypatch: Any) -> None:
-    asked: list[Any] = []
+def test_a_protocol_is_chosen_in_the_workspace(parent: QWidget, tmp_path: Path, monkeypatch: Any) -> None:
+    calls: list[Any] = []
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *given: asked.append(given) or ("/a.toml", "filter"))
+    monkeypatch.setattr(
+        QFileDialog, "getOpenFileName", lambda *arguments: calls.append(arguments) or ("/a.toml", "filter")
+    )
     assert choose_protocol(parent, "Open") == "/a.toml"
-    assert asked == [(parent, "Open", str(tmp_path / "protocols"), "Protocols (*.toml)")]
+    assert calls == [(parent, "Open", str(tmp_path / "protocols"), "Protocols (*.toml)")]

@@ -25,6 +25,6 @@ def still() -> LabView:
 
 @pytest.fixture
 def place(qtbot: Any) -> Any:
-    made = windows.shown(qtbot, LabPlace(), (1528, 900))
-    made.activateWindow()
-    return made
+    lab_place = windows.show_window(qtbot, LabPlace(), (1528, 900))
+    lab_place.activateWindow()
+    return lab_place

@@ -1,4 +1,4 @@
-"""A lab as it would look: a ball moved offline through two liquids, A felt and B on the same motion."""
+"""A sample lab: a ball moved offline through two liquids, A felt and B on the same motion."""
 
 import dataclasses
 import random
@@ -73,7 +73,7 @@ def workbench(a: str = "water", b: str = "light_oil", **changes: float) -> Workb
 
 def still_view(bench: Workbench | None = None, **fields: Any) -> LabView:
     """Return the lab before anything has moved."""
-    shown: dict[str, Any] = {
+    values: dict[str, Any] = {
         "workbench": bench or workbench(),
         "liquids": tuple(Choice(title) for title in ("Water", "Honey", "Light oil", "Syrup")),
         "device": DeviceShown(
@@ -101,7 +101,7 @@ def still_view(bench: Workbench | None = None, **fields: Any) -> LabView:
         ),
         "limiters": LimiterCounts().rows(8.0, 1.5),
     }
-    return LabView(**(shown | fields))
+    return LabView(**(values | fields))
 
 
 def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields: Any) -> LabView:
@@ -130,9 +130,9 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
     return still_view(bench, **(moved | fields))
 
 
-def blind(bench: Workbench, *, first: str = "A", felt: str = "A") -> Workbench:
+def blind(bench: Workbench, *, first: str = "A", presented: str = "A") -> Workbench:
     drawn = bench.blinded(random.Random(1))  # noqa: S311 - drawn, then set
-    return dataclasses.replace(drawn, first=first, presented=felt)  # type: ignore[arg-type]
+    return dataclasses.replace(drawn, first=first, presented=presented)  # type: ignore[arg-type]
 
 
 def heard(place: Any, name: str) -> list[tuple[Any, ...]]:

@@ -21,7 +21,7 @@ from tests.gui.lab.sample import blind, still_view, workbench
 from tests.gui.transcript import Actions, clicked, in_turn
 
 
-def flowing() -> dict[str, Any]:
+def made_up_motion() -> dict[str, Any]:
     """Return a motion of both sides, made up: a zigzag with three segments and two oscillating forces."""
     count = 300
     share = np.linspace(0.0, 1.0, count)
@@ -67,14 +67,14 @@ def of_lab(**fields: Any) -> Callable[[Any], None]:
 
 
 def shown_now(place: QWidget) -> None:
-    """Let what waits for a single timer come at once."""
+    """Run the pending single-shot timers at once."""
     for timer in place.findChildren(QTimer):
         if timer.isSingleShot() and timer.isActive():
             timer.start(0)
 
 
 def refused(place: Any) -> None:
-    """Type what is no number, and a length that the model refuses."""
+    """Type an invalid number, and a length that the model refuses."""
     for name, text in (("wake.exponent", "0.5.5"), ("wake.length", "9000")):
         field = place.form.rows[name].field
         field.selectAll()
@@ -93,7 +93,7 @@ def left_by_escape(place: Any) -> None:
 
 
 def held_over_a_switch(place: Any) -> None:
-    """Call for the other side while a knob is held, and move it on there."""
+    """Switch sides while a knob is held, and move it on."""
     place.show_view(still_view())
     slider = place.form.rows["wake.length"].slider
     QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=QPoint(30, 16))
@@ -103,9 +103,9 @@ def held_over_a_switch(place: Any) -> None:
 
 
 LAB: Actions = {
-    "moved": lambda place: place.show_view(still_view(**flowing())),
-    "B felt": lambda place: place.show_view(still_view(workbench().switch(), **flowing())),
-    "blind": lambda place: place.show_view(still_view(blind(workbench(), first="B"), **flowing())),
+    "moved": lambda place: place.show_view(still_view(**made_up_motion())),
+    "B felt": lambda place: place.show_view(still_view(workbench().switch(), **made_up_motion())),
+    "blind": lambda place: place.show_view(still_view(blind(workbench(), first="B"), **made_up_motion())),
     "measuring": of_lab(cost=(), errors=(), tick_ns=None, measuring=True),
     "not measured": of_lab(cost=(), errors=()),
     "refused": refused,

@@ -20,7 +20,7 @@ def test_a_curve_keeps_the_newest_sample_and_every_peak(place: Any, still: LabVi
     for peak in range(max(0, count - 12), count):
         speed, none = np.zeros(count), np.zeros((count, 3))
         speed[peak] = 7.0
-        values = {one.name: none if one.name.endswith("_n") else speed for one in dataclasses.fields(Trace)}
+        values = {field.name: none if field.name.endswith("_n") else speed for field in dataclasses.fields(Trace)}
         trace = Trace(**(values | {"t_s": np.arange(count) / 1000}))
         place.show_view(dataclasses.replace(still, trace=trace))
         times, kept = place.speed.plot.curves[0].getData()
@@ -29,17 +29,20 @@ def test_a_curve_keeps_the_newest_sample_and_every_peak(place: Any, still: LabVi
         assert np.count_nonzero(kept == 7.0) == 1
 
 
-def test_each_name_in_a_legend_is_that_of_the_curve_in_its_colour(place: Any, still: LabView) -> None:
+def test_each_name_in_a_legend_matches_the_curve_of_its_colour(place: Any, still: LabView) -> None:
     drawn = {"body_mps": 1.0, "wake_a_mps": 2.0, "wake_b_mps": 3.0, "force_a_n": 4.0, "force_b_n": 5.0}
-    values = {one.name: np.zeros((3, 3) if one.name.endswith("_n") else 3) for one in dataclasses.fields(Trace)}
+    values = {field.name: np.zeros((3, 3) if field.name.endswith("_n") else 3) for field in dataclasses.fields(Trace)}
     for name, value in drawn.items():
         values[name][..., 0] = value
         values[name][1] = value if name.endswith("_mps") else (0, value, 0)
         values[name][2] = value if name.endswith("_mps") else (0, 0, -value)
     trace = Trace(**(values | {"t_s": np.array([-0.2, -0.1, 0.0])}))
     view = dataclasses.replace(still, trace=trace)
-    for felt, force_a, force_b in (("A", "A (felt now)", "B (same motion)"), ("B", "A (same motion)", "B (felt now)")):
-        place.show_view(dataclasses.replace(view, workbench=dataclasses.replace(view.workbench, presented=felt)))
+    for presented, force_a, force_b in (
+        ("A", "A (felt now)", "B (same motion)"),
+        ("B", "A (same motion)", "B (felt now)"),
+    ):
+        place.show_view(dataclasses.replace(view, workbench=dataclasses.replace(view.workbench, presented=presented)))
         for card, names in (
             (place.speed, {"body": 1.0, "wake of A": 2.0, "wake of B": 3.0}),
             (place.force, {force_a: 4.0, force_b: 5.0}),
@@ -103,5 +106,5 @@ def test_costs_errors_and_limiters_are_listed_with_their_values(place: Any, stil
     assert place.cost.sum.text() == f"23\u2009456 ns of {period_ms:g} ms"
     place.show_view(dataclasses.replace(view, cost=(), errors=(), measuring=True))
     assert [line.ns.text() for line in place.cost.lines] == ["–", "–"]
-    assert (place.cost.sum.text(), place.cost.aside.text()) == ("–", "A, measuring …")
+    assert (place.cost.sum.text(), place.cost.aside.text()) == ("–", "A, measuring…")
     assert [(line.name.whole, line.value.text()) for line in place.error.lines] == [("Largest force error", "–")]

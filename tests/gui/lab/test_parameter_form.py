@@ -1,4 +1,4 @@
-"""Every parameter with slider and field, nothing typed is lost; the force can be stopped from wherever one is."""
+"""Every parameter has slider and field, no typing is lost, and the force can be stopped from everywhere."""
 
 import dataclasses
 from typing import Any
@@ -18,11 +18,11 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def told(place: Any, still: LabView) -> list[tuple[Any, ...]]:
-    said: list[tuple[Any, ...]] = []
-    place.asked.connect(lambda what, details: said.append(details) if what == "change" else None)
+def changes(place: Any, still: LabView) -> list[tuple[Any, ...]]:
+    recorded: list[tuple[Any, ...]] = []
+    place.asked.connect(lambda what, details: recorded.append(details) if what == "change" else None)
     place.show_view(still)
-    return said
+    return recorded
 
 
 def fields(place: Any) -> dict[str, Any]:
@@ -35,20 +35,22 @@ def enter(field: Any, text: str) -> None:
     QTest.keyClick(field, Qt.Key.Key_Return)
 
 
-def test_every_number_says_exactly_what_it_shows_when_entered_again(place: Any, told: Any, still: LabView) -> None:
-    """Millimetres and rounding do not creep into a parameter that was only looked at."""
+def test_entering_a_shown_number_again_leaves_the_parameter_exactly_unchanged(
+    place: Any, changes: Any, still: LabView
+) -> None:
+    """Neither units nor rounding change a parameter that was only viewed."""
     for name, row in fields(place).items():
         value = still.workbench.a.value(name)
         if value is None:
             continue
-        told.clear()
+        changes.clear()
         QTest.keyClick(row.field, Qt.Key.Key_End)
         row.field.setModified(True)
         QTest.keyClick(row.field, Qt.Key.Key_Return)
-        assert told == [(name, value, False)]
+        assert changes == [(name, value, False)]
 
 
-def test_what_the_model_refuses_stays_with_the_reason_until_it_is_mended(place: Any, told: Any, still: LabView) -> None:
+def test_a_refused_value_stays_with_its_reason_until_it_is_corrected(place: Any, changes: Any, still: LabView) -> None:
     row = fields(place)["wake.length"]
     enter(row.field, "9000")
     why = "length 9000 exceeds scaling 2600: reduce length or increase scaling"
@@ -61,22 +63,22 @@ def test_what_the_model_refuses_stays_with_the_reason_until_it_is_mended(place: 
     place.show_view(dataclasses.replace(still, workbench=roomier))
     assert (row.field.text(), row.field.state) == ("9000", "refused")
     QTest.keyClick(row.field, Qt.Key.Key_Return)  # what was in its way is gone: try again
-    assert told[-1] == ("wake.length", 9000, False)
+    assert changes[-1] == ("wake.length", 9000, False)
     place.show_view(dataclasses.replace(still, workbench=roomier.change("wake.length", 9000)))
     assert (row.field.text(), row.field.state, row.refused) == ("9000", "changed", "")
 
 
-def test_a_number_that_can_be_read_in_two_ways_changes_nothing(place: Any, told: Any) -> None:
+def test_a_number_that_can_be_read_in_two_ways_changes_nothing(place: Any, changes: Any) -> None:
     row = fields(place)["wake.length"]
     enter(row.field, "2,500")
-    assert told == []
+    assert changes == []
     assert (row.field.text(), row.field.state) == ("2,500", "refused")
     assert row.why.text() == "“2,500” can be read as 2.5 or 2500: write 2.5 or 2500, or press Esc."
     enter(row.field, "2500")
-    assert told[-1] == ("wake.length", 2500, False)
+    assert changes[-1] == ("wake.length", 2500, False)
 
 
-def test_the_other_side_releases_a_held_knob_and_forgets_what_was_typed(place: Any, told: Any, still: LabView) -> None:
+def test_switching_sides_releases_a_held_knob_and_discards_typing(place: Any, changes: Any, still: LabView) -> None:
     name = "liquid.density_kg_m3"
     row, other = fields(place)[name], still.workbench.switch()
     QTest.mousePress(row.slider, Qt.MouseButton.LeftButton)
@@ -142,7 +144,7 @@ def test_esc_held_stops_the_force_from_any_part_also_while_a_preset_is_being_sav
     assert len(said) == 1, "Esc held elsewhere asks nothing of a lab that was left"
 
 
-def test_the_keyboard_stays_in_a_switch_that_takes_parameters_away(place: Any, told: Any, still: LabView) -> None:
+def test_the_keyboard_stays_in_a_switch_that_takes_parameters_away(place: Any, changes: Any, still: LabView) -> None:
     switch = place.form.rows["effects.wake"]
     switch.parts()[0].setFocus()
     place.show_view(dataclasses.replace(still, workbench=still.workbench.change("effects.wake", OFF)))

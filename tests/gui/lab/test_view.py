@@ -1,4 +1,4 @@
-"""Blind, the lab tells nothing; and what the pointer moves."""
+"""The blinded lab reveals nothing; and motion by the pointer."""
 
 import dataclasses
 from typing import Any
@@ -15,13 +15,13 @@ from tests.gui.walk import settle
 pytestmark = pytest.mark.slow
 
 
-def shown(place: Any) -> list[QWidget]:
+def visible_widgets(place: Any) -> list[QWidget]:
     return [it for it in place.findChildren(QWidget) if it.isVisible()]
 
 
 def words_of(place: Any) -> str:
     said = []
-    for it in shown(place):
+    for it in visible_widgets(place):
         said += [it.accessibleName(), it.accessibleDescription(), it.toolTip()]
         if isinstance(it, QLabel | QAbstractButton | QLineEdit):
             said.append(it.text())
@@ -52,14 +52,19 @@ def test_while_blind_both_sides_look_alike_but_for_which_is_felt(place: Any, mov
     pictures = []
     place.show_view(moved)
     settle(place)
-    for first, felt in (("A", "A"), ("B", "B")):
-        bench = blind(moved.workbench, first=first, felt=felt)
-        other = {} if felt == "A" else {"cost": moved.cost[:2], "errors": (), "limiters": moved.limiters[:3]}
+    for first, presented in (("A", "A"), ("B", "B")):
+        bench = blind(moved.workbench, first=first, presented=presented)
+        other = {} if presented == "A" else {"cost": moved.cost[:2], "errors": (), "limiters": moved.limiters[:3]}
         place.show_view(dataclasses.replace(moved, workbench=bench, **other))
         settle(place)
         pictures.append(place.grab().toImage())
-        one, two = place.header.sides.segments.values()
-        assert (one.text(), two.text(), one.isChecked(), two.isChecked()) == ("Setting 1", "Setting 2", True, False)
+        first_segment, second_segment = place.header.sides.segments.values()
+        assert (first_segment.text(), second_segment.text(), first_segment.isChecked(), second_segment.isChecked()) == (
+            "Setting 1",
+            "Setting 2",
+            True,
+            False,
+        )
         assert (len(place.cost.lines), len(place.limiters.lines)) == (5, 11)  # nothing behind the curtain moves
     assert pictures[0] == pictures[1]
 
@@ -86,13 +91,13 @@ def test_the_mouse_moves_the_ball_from_a_click_to_the_next_and_only_while_it_lea
 
 
 def test_a_device_that_failed_is_tried_again_or_examined(place: Any, still: LabView) -> None:
-    asked: list[str] = []
-    place.asked.connect(lambda what, _details: asked.append(what))
+    requests: list[str] = []
+    place.asked.connect(lambda what, _details: requests.append(what))
     lost = dataclasses.replace(still.device, state="stopped", diagnosable=True)
     place.show_view(dataclasses.replace(still, device=lost, trouble="the Falcon is gone", force_on=False))
     for button in (place.note.fade_in, place.note.diagnose):
         QTest.mouseClick(button, Qt.MouseButton.LeftButton)
-    assert (place.note.fade_in.text(), asked) == ("Try again", ["fade in", "diagnose"])
+    assert (place.note.fade_in.text(), requests) == ("Try again", ["fade in", "diagnose"])
     for changed, trouble in (({"diagnosable": False}, "the mouse is gone"), ({"state": "ready"}, "no such file")):
         device = dataclasses.replace(lost, **changed)
         place.show_view(dataclasses.replace(still, device=device, trouble=trouble, force_on=False))

@@ -1,4 +1,4 @@
-"""A demo session told event by event, as the journal would tell it."""
+"""A demo session that is built event by event, as its journal would report it."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from tests.gui.operator.session import Told, measured_health, new_session
 
 
 @pytest.fixture
-def told() -> Told:
+def demo_session() -> Told:
     return new_session()
 
 

@@ -1,4 +1,4 @@
-"""A demo session told event by event, as the journal would tell it."""
+"""A demo session that is built event by event, as its journal would report it."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -18,7 +18,7 @@ from tests.journal_lines import event_of
 
 @dataclass
 class Told:
-    """A session told so far; ``now_s`` moves with every event."""
+    """The progress of a session; ``now_s`` advances with every event."""
 
     protocol: Protocol
     schedule: Schedule
@@ -35,12 +35,12 @@ class Told:
         self.tell("page_shown", 1.0, page="welcome")
 
     def make_single_blind(self) -> None:
-        """Let the operator see forces."""
+        """Make the session single-blind, so that the operator sees forces."""
         study = self.protocol.study.model_copy(update={"blinding": "single"})
         self.session = replace(self.session, protocol=self.protocol.model_copy(update={"study": study}))
 
     def start(self, number: int, attempt: int = 1) -> None:
-        """Start a trial; the steps before it are passed over."""
+        """Start a trial; earlier steps are skipped."""
         trial = self.schedule.trials[number - 1]
         for step in self.schedule.steps[self.progress.here + 1 : self.schedule.steps.index(trial)]:
             self.tell("passed_over", **({"trial": step.number} if isinstance(step, Trial) else {"page": step.page_id}))

@@ -29,16 +29,16 @@ REFRESH_NS = 16_666_667
 
 
 def samples(count: int, *, first: int = 0, period_ns: int = MS, **fields: Any) -> Any:
-    made = records(SAMPLE, count)
-    made.tick = np.arange(first, first + count)
-    made.time_ns = made.tick * period_ns
+    batch = records(SAMPLE, count)
+    batch.tick = np.arange(first, first + count)
+    batch.time_ns = batch.tick * period_ns
     for name, value in ({"scene": 1, "lateness_ns": 15_000} | fields).items():
-        setattr(made, name, value)
-    return made
+        setattr(batch, name, value)
+    return batch
 
 
 def ends(name: str, values: Any) -> str:
-    """Return how many values there are, the first, the last and the mean, and whether they rise."""
+    """Return the count, first, last and mean of values, and whether they rise."""
     values = np.asarray(values)
     rises = "rise" if (np.diff(values, axis=0) > 0).all() else "do not rise"
     return f"{name}: {len(values)} {rises}, {values[0]} to {values[-1]}, mean {values.mean(axis=0)}"
@@ -51,7 +51,7 @@ def of_health(health: ServoHealth, now_s: float = 0.0) -> Iterator[str]:
         yield f"histogram: {counts.sum()} from {edges[0]} to {edges[-1]}"
         yield ends("sorted latenesses", np.sort(health.lateness_ns))
     if now_s:
-        yield from (ends(*one) for one in zip(("times", "places"), health.trace(now_s), strict=True))
+        yield from (ends(*curve) for curve in zip(("times", "places"), health.trace(now_s), strict=True))
 
 
 def healths() -> Iterator[str]:
@@ -111,7 +111,7 @@ def forces() -> Iterator[str]:
                 it.add_samples(part)
                 end = int(part.time_ns[-1]) + MS
             yield from value_lines(it.figures())
-        yield from (ends(*one) for one in zip(("times", "forces"), it.trace(end), strict=True))
+        yield from (ends(*curve) for curve in zip(("times", "forces"), it.trace(end), strict=True))
 
 
 def frame_times() -> Iterator[str]:
@@ -143,15 +143,15 @@ def test_rest_changes_only_the_force_of_now() -> None:
     forces.add_samples(
         samples(5, scene=2, device_force_n=(0.0, 0.0, -6.0), limiters=LIMITER_NORM, permitted_n=4.0, withheld_n=1.0)
     )
-    counted = ForceFigures(share=0.75, most=0.75, limiters=(("force", 5),), withheld=0.25)
-    assert forces.figures() == counted
+    expected = ForceFigures(share=0.75, most=0.75, limiters=(("force", 5),), withheld=0.25)
+    assert forces.figures() == expected
     forces.add_samples(samples(7, scene=0, device_force_n=(2.0, 0.0, 0.0), limiters=LIMITER_SLEW, withheld_n=9.0))
-    assert forces.figures() == replace(counted, share=0.25)
+    assert forces.figures() == replace(expected, share=0.25)
     forces.add_samples(samples(0))
-    assert forces.figures() == replace(counted, share=0.25)
+    assert forces.figures() == replace(expected, share=0.25)
 
 
-def test_a_batch_of_two_scenes_counts_the_newest_alone() -> None:
+def test_a_batch_of_two_scenes_counts_only_the_newest() -> None:
     forces = Forces(8.0)
     batch = samples(9, scene=np.array([1] * 4 + [0] + [2] * 3 + [0]), permitted_n=np.arange(1.0, 10.0))
     batch.device_force_n[:, 0] = (7.0, 7.5, 6.0, 5.0, 1.0, 2.0, 4.0, 3.0, 0.8)
@@ -178,6 +178,6 @@ def test_a_peak_of_one_tick_is_not_missed_however_it_came_in() -> None:
         for first in range(0, 4000, batch):
             forces.add_samples(pushed[first : first + batch])
         traces.append(np.column_stack(forces.trace(4000 * MS)))
-    assert all(np.array_equal(one, other) for one, other in pairwise(traces))
+    assert all(np.array_equal(trace, next_trace) for trace, next_trace in pairwise(traces))
     (peak,) = traces[0][traces[0][:, 4] == 7.5]
     assert peak[:5].tolist() == [pytest.approx(-(4000 - 1234) / 1000, abs=0.02), 0.0, -7.5, 0.0, 7.5]

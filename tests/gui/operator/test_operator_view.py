@@ -9,7 +9,7 @@ import pytest
 from study_app.gui.operator.operator_view import stages
 from study_app.gui.operator.servo_health import ForceFigures, ServoHealth
 from study_app.gui.sessions.session_facts import LIMIT_WORDS
-from study_app.number_text import clock_text, duration, duration_range, duration_words, grouped
+from study_app.number_text import clock_text, duration, duration_range, duration_text, grouped
 from study_app.protocol.load import load
 from study_app.protocol.model import Limits
 from study_app.protocol.orders.schedule import build_schedule
@@ -26,12 +26,12 @@ SECRETS = ("thin", "thick", "prompt", "200")
 
 
 def words(view):
-    """Return every text of a view, its notes left out."""
-    found = []
+    """Return every text of a view except its notes."""
+    texts = []
 
     def walk(value):
         if isinstance(value, str):
-            found.append(value)
+            texts.append(value)
         elif isinstance(value, tuple):
             for part in value:
                 walk(part)
@@ -40,7 +40,7 @@ def words(view):
                 walk(getattr(value, part.name))
 
     walk(view)
-    return found
+    return texts
 
 
 BROKEN = {"lateness_p99_ms": 1.0, "worst_gap_ms": 31.25, "withheld_share": 0.0712, "delay_error_p95_ms": 27.211752}
@@ -82,7 +82,7 @@ def after_changes(lines):
 
 
 def late():
-    """Return the health of a servo that is late, with a device that answers later than at the start."""
+    """Return the health of a late servo whose device answers later than at the start."""
     measured = ServoHealth(1000.0)
     for delay_ticks in (1, 3):
         samples = ticks(600, first=600 * (delay_ticks // 2), lateness_ns=4_000_000)
@@ -93,14 +93,14 @@ def late():
 
 
 @pytest.mark.parametrize(("blinding", "ended"), [("double", "withdrawn"), ("single", "completed")])
-def test_a_view_after_each_event_is_the_reviewed_one(told, blinding, ended, pytestconfig):
+def test_a_view_after_each_event_is_the_reviewed_one(demo_session, blinding, ended, pytestconfig):
     if blinding == "single":
-        told.make_single_blind()
+        demo_session.make_single_blind()
     lines, before = list[str](), list[str]()
     end = (lambda it: it.tell("session_ended", 4.0, status=ended, reason="", fingerprint="k3vq-7m2p-xw4d"), {})
     for number, (event, said) in enumerate((*STORY, end)):
-        event(told)
-        view = told.view(late() if number == 4 else None, **said)
+        event(demo_session)
+        view = demo_session.view(late() if number == 4 else None, **said)
         time = view.trial_time and view.trial_time.words
         after = [*value_lines(view), f"trials: {view.trials_line}", f"time: {time}"]
         lines += [f"== {number}", *changed(before, after)]
@@ -111,19 +111,21 @@ def test_a_view_after_each_event_is_the_reviewed_one(told, blinding, ended, pyte
     compare(Path(__file__).parent / "golden" / "operator_single_blind.txt", each_once(what_comes(lines)), pytestconfig)
 
 
-def pair(told, number, answer, seconds=1.0, attempt=1):
-    """Let a pair of intervals be answered."""
-    told.tell("trial_started", 10.0, trial=number, attempt=attempt, phase="main", sealed="00")
-    told.tell("trial_ended", 4.0, trial=number, attempt=attempt, outcome="complete")
+def pair(demo_session, number, answer, seconds=1.0, attempt=1):
+    """Record an answered pair of intervals."""
+    demo_session.tell("trial_started", 10.0, trial=number, attempt=attempt, phase="main", sealed="00")
+    demo_session.tell("trial_ended", 4.0, trial=number, attempt=attempt, outcome="complete")
     item = {"item": "choice_2ifc", "value": answer, "onset_s": 5.0, "first_s": 5.0 + seconds}
-    told.tell("responses", 2.0, trial=number, attempt=attempt, items=[item])
+    demo_session.tell("responses", 2.0, trial=number, attempt=attempt, items=[item])
 
 
-def undelivered(told, number, attempt, *limits):
-    """Present a pair whose first interval broke limits."""
-    told.tell("trial_started", 1.0, trial=number, attempt=attempt, phase="main", sealed="00")
-    told.tell("interval_ended", 2.0, trial=number, attempt=attempt, interval=1, outcome="complete", invalid=limits)
-    told.tell("trial_ended", 3.0, trial=number, attempt=attempt, outcome="invalid")
+def undelivered(demo_session, number, attempt, *limits):
+    """Record a pair whose first interval exceeded limits."""
+    demo_session.tell("trial_started", 1.0, trial=number, attempt=attempt, phase="main", sealed="00")
+    demo_session.tell(
+        "interval_ended", 2.0, trial=number, attempt=attempt, interval=1, outcome="complete", invalid=limits
+    )
+    demo_session.tell("trial_ended", 3.0, trial=number, attempt=attempt, outcome="invalid")
 
 
 PAIRS = (
@@ -148,15 +150,17 @@ PAIRS = (
 )
 
 
-def test_tracks_after_each_event_are_the_reviewed_ones(told):
+def test_tracks_after_each_event_are_the_reviewed_ones(demo_session):
     protocol = study()
     schedule = build_schedule(protocol, "P001", 1)
-    session = dataclasses.replace(told.session, protocol=protocol, schedule=schedule, stages=stages(protocol, schedule))
-    told = dataclasses.replace(told, protocol=protocol, schedule=schedule, session=session)
+    session = dataclasses.replace(
+        demo_session.session, protocol=protocol, schedule=schedule, stages=stages(protocol, schedule)
+    )
+    demo_session = dataclasses.replace(demo_session, protocol=protocol, schedule=schedule, session=session)
     lines, before = list[str](), list[str]()
     for number, event in enumerate(PAIRS):
-        event(told)
-        view = told.view()
+        event(demo_session)
+        view = demo_session.view()
         after = [*view.track, view.setting_line, f"time: {view.trial_time and view.trial_time.words}"]
         lines += [f"== {number}", *changed(before, after)]
         before = after
@@ -170,7 +174,7 @@ def test_tracks_after_each_event_are_the_reviewed_ones(told):
     assert set(REASONS) == {*Limits.model_fields, "force_limit_n"} - {"attempts", MISSING_PERCENT}
 
 
-def test_rows_cover_every_step_once_and_name_no_condition_and_no_liquid():
+def test_rows_cover_every_step_once_without_naming_conditions_or_liquids():
     protocol = load("rek2024")
     schedule = build_schedule(protocol, "P001", 1)
     rows = stages(protocol, schedule)
@@ -181,23 +185,23 @@ def test_rows_cover_every_step_once_and_name_no_condition_and_no_liquid():
     assert not {*conditions, "water", "honey", "oil", "ms"} & set(" ".join(labels).lower().split())
 
 
-def test_every_limit_of_a_trial_has_a_name_for_the_operator(told):
+def test_every_limit_of_a_trial_has_a_name_for_the_operator(demo_session):
     bad = dict.fromkeys(header(TRIALS), 1000000000.0) | {"targets_reached": 0.0}
     limits = Limits(targets_percent=50).model_dump()
     judged = {measure for measure, _, _ in beyond_limits(bad, limits)}
     assert judged == set(LIMIT_WORDS)
 
 
-def test_no_word_of_a_view_names_a_condition_a_force_or_a_limiter(told, health):
-    told.welcome()
-    for trial in told.schedule.trials:
-        told.start(trial.number)
-        said = " ".join(words(told.view(health))).lower().split()
+def test_no_word_of_a_view_names_a_condition_a_force_or_a_limiter(demo_session, health):
+    demo_session.welcome()
+    for trial in demo_session.schedule.trials:
+        demo_session.start(trial.number)
+        said = " ".join(words(demo_session.view(health))).lower().split()
         for secret in SECRETS:
             assert secret not in said
-        told.end(trial.number)
-        told.answer(trial.number)
-    assert "hidden" in " ".join(words(told.view(health)))
+        demo_session.end(trial.number)
+        demo_session.answer(trial.number)
+    assert "hidden" in " ".join(words(demo_session.view(health)))
 
 
 def test_durations_are_written_in_one_way() -> None:
@@ -206,7 +210,7 @@ def test_durations_are_written_in_one_way() -> None:
         (3599, "1 h 00 min"), (3900, "1 h 05 min"),
     ):  # fmt: skip
         assert duration(seconds) == duration_range(seconds, seconds) == words
-    assert [duration(one, tenths=True) for one in (0.6, 11.42, 120)] == ["0.6 s", "11.4 s", "2 min"]
+    assert [duration(seconds_taken, tenths=True) for seconds_taken in (0.6, 11.42, 120)] == ["0.6 s", "11.4 s", "2 min"]
     for least, most, words in (
         (900, 1920, "15 to 32 min"),
         (3300, 4200, "55 min to 1 h 10 min"),
@@ -215,4 +219,4 @@ def test_durations_are_written_in_one_way() -> None:
     ):
         assert duration_range(least, most) == words
     assert (clock_text(68), clock_text(3723), grouped(45918)) == ("1:08", "1:02:03", "45\u2009918")
-    assert (duration_words(62e-6), duration_words(1.4e-3)) == ("62 µs", "1.4 ms")
+    assert (duration_text(62e-6), duration_text(1.4e-3)) == ("62 µs", "1.4 ms")

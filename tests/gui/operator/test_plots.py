@@ -14,7 +14,7 @@ from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.cards import Chip, MaskedPanel
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot, tick_step
 from tests.gui.operator.session import new_session, ticks
-from tests.gui.windows import shown
+from tests.gui.windows import show_window
 
 TIMES_S = np.array([-9.0, -4.0, -1.0])
 
@@ -24,8 +24,8 @@ def grid_lines(plot: TracePlot) -> list[InfiniteLine]:
     return sorted(lines, key=InfiniteLine.value)
 
 
-def test_each_tile_shows_and_speaks_its_number_and_what_its_verdict_means(qtbot: Any) -> None:
-    tiles = shown(qtbot, Tiles(), (900, 120))
+def test_each_tile_shows_and_speaks_its_number_and_verdict(qtbot: Any) -> None:
+    tiles = show_window(qtbot, Tiles(), (900, 120))
     card = tiles.cards[2]
     for verdict, icon, ink, meaning in (
         ("ok", "check", "ok", "within limits"),
@@ -45,7 +45,7 @@ def test_each_tile_shows_and_speaks_its_number_and_what_its_verdict_means(qtbot:
 
 
 def test_a_trace_is_drawn_over_time_with_its_name_at_its_end_and_a_range_that_grows(qtbot: Any) -> None:
-    plot = shown(qtbot, TracePlot(10.0, 50.0), (420, 300))
+    plot = show_window(qtbot, TracePlot(10.0, 50.0), (420, 300))
     seconds = [(0, "0 s"), (-2, "−2 s"), (-4, "−4 s"), (-6, "−6 s"), (-8, "−8 s"), (-10, "−10 s")]
     assert not any(end.isVisible() for end in plot.ends)
     for newest, texts in (
@@ -70,7 +70,7 @@ def test_a_trace_is_drawn_over_time_with_its_name_at_its_end_and_a_range_that_gr
 
 
 def test_grid_lines_are_horizontal_behind_the_curves_and_in_the_colour_of_the_theme(qtbot: Any) -> None:
-    plot = shown(qtbot, TracePlot(10.0, 50.0), (420, 300))
+    plot = show_window(qtbot, TracePlot(10.0, 50.0), (420, 300))
     for theme in (LIGHT, DARK):
         plot.apply_theme(theme)
         plot.show_ticks("bottom", [(-7.0, "−7 s")])
@@ -80,7 +80,7 @@ def test_grid_lines_are_horizontal_behind_the_curves_and_in_the_colour_of_the_th
 
 
 def test_a_histogram_has_bars_by_decades_a_percentile_and_the_limit(qtbot: Any) -> None:
-    plot = shown(qtbot, LatenessPlot(2000.0), (640, 300))
+    plot = show_window(qtbot, LatenessPlot(2000.0), (640, 300))
     edges_us, counts = np.array([1.0, 10.0, 100.0, 1000.0, 10_000.0]), np.array([0, 3, 100_000, 10])
     plot.show_histogram(edges_us, counts, 50.4)
     assert plot.bars.opts["x"] == pytest.approx([1.5, 2.5, 3.5])
@@ -96,8 +96,8 @@ def test_a_histogram_has_bars_by_decades_a_percentile_and_the_limit(qtbot: Any) 
         assert plot.p99_name.isVisible() == plot.p99_line.isVisible() == (p99_us is not None)
 
 
-def test_the_force_is_scaled_to_what_is_felt_and_its_limit_is_drawn_only_within_the_scale(qtbot: Any) -> None:
-    card = shown(qtbot, ForceCard(8.0), (500, 320))
+def test_the_force_scale_fits_the_force_and_shows_the_limit_only_within_it(qtbot: Any) -> None:
+    card = show_window(qtbot, ForceCard(8.0), (500, 320))
     plot = card.plot
     for size_n, reach_n in ((1.0, 1.5), (1.4, 1.5), (0.02, 1.0), (7.9, 10.0), (6.0, 10.0), (3.0, 4.0)):
         forces_n = np.array([[0.0, 0.0, 0.0, 0.0], [-size_n, 0.1, 0.2, size_n], [0.3, 0.0, 0.4, 0.5 * size_n]])
@@ -108,7 +108,7 @@ def test_the_force_is_scaled_to_what_is_felt_and_its_limit_is_drawn_only_within_
     assert ([line.value() for line in plot.limits], plot.limit_name.toPlainText()) == ([8.0, -8.0], "limit 8 N")
 
 
-def test_each_card_says_what_it_shows_in_which_unit(qtbot: Any) -> None:
+def test_each_card_names_its_quantity_and_unit(qtbot: Any) -> None:
     health = ServoHealth(1000.0)
     health.add_samples(ticks(300, lateness_ns=47_000))
     for at_s, position_m in ((1.0, (0.01, -0.02, 0.03)), (2.5, (0.04, 0.015, -0.006))):

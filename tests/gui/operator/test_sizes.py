@@ -38,14 +38,14 @@ STATES: dict[str, tuple[dict[str, dict[str, Any]], dict[str, Any]]] = {
 }
 
 
-def run(told: Any) -> None:
-    told.welcome()
-    told.start(1)
+def run(demo_session: Any) -> None:
+    demo_session.welcome()
+    demo_session.start(1)
     for text in ("Right-handed, no glasses.", "Adjusted the chair, elbow supported, asked twice whether all is well"):
-        told.tell("note", 5.0, kind="note", text=text)
-    told.end(1, worst_gap_ms=31.0)
-    told.answer(1)
-    told.start(2)
+        demo_session.tell("note", 5.0, kind="note", text=text)
+    demo_session.end(1, worst_gap_ms=31.0)
+    demo_session.answer(1)
+    demo_session.start(2)
 
 
 def pushes() -> Any:
@@ -61,27 +61,29 @@ def pushes() -> Any:
 
 @pytest.fixture(params=[None, 6.0], ids=["double", "single"])
 def window(request: pytest.FixtureRequest, qtbot: Any) -> Iterator[OperatorWindow]:
-    made = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=False, force_limit_n=request.param)
-    qtbot.addWidget(made)
-    made.header.page.show()  # as on one screen, where the header has least room
-    made.show()
-    qtbot.waitExposed(made)
-    yield made
-    made.may_close = True
-    made.close()
+    operator_window = OperatorWindow(
+        "demo", lateness_limit_s=0.002, reach_m=0.05, pointer=False, force_limit_n=request.param
+    )
+    qtbot.addWidget(operator_window)
+    operator_window.header.page.show()  # as on one screen, where the header has least room
+    operator_window.show()
+    qtbot.waitExposed(operator_window)
+    yield operator_window
+    operator_window.may_close = True
+    operator_window.close()
 
 
-def filled(window: OperatorWindow, told: Any, health: Any, state: str) -> None:
+def fill_window(window: OperatorWindow, demo_session: Any, health: Any, state: str) -> None:
     happened, said = STATES[state]
     if state != "preparing":
-        run(told)
+        run(demo_session)
     for event, fields in happened.items():
-        told.tell(event, **fields)
+        demo_session.tell(event, **fields)
     forces = Forces(6.0)
     forces.add_samples(pushes())
     if single := hasattr(window.force, "plot"):
-        told.make_single_blind()
-    view = told.view(health, forces=forces.figures() if single else None, **said)
+        demo_session.make_single_blind()
+    view = demo_session.view(health, forces=forces.figures() if single else None, **said)
     if state == "trouble":
         view = replace(view, may_reconnect=True, reconnection=UNCONNECTED)
     for _ in range(2):
@@ -92,23 +94,23 @@ def filled(window: OperatorWindow, told: Any, health: Any, state: str) -> None:
 
 
 def beyond_the_plot(window: OperatorWindow) -> list[str]:
-    """Return the names of curves that do not stand whole in their plot."""
-    found = []
+    """Return the names of curves whose labels are not fully inside their plot."""
+    names = []
     for plot in (card.plot for card in (window.position, window.force) if hasattr(card, "plot")):
         plot.grab()  # names take their places when they are painted
         box = plot.box.mapRectToScene(plot.box.boundingRect()).adjusted(-1, -2, 1, 2)
-        found += [
+        names += [
             end.textItem.toPlainText()
             for end in plot.ends
             if end.isVisible() and not box.contains(end.textItem.mapRectToScene(end.textItem.boundingRect()))
         ]
-    return found
+    return names
 
 
 @pytest.mark.variants(5)
 @pytest.mark.parametrize("state", STATES)
-def test_nothing_is_clipped(window: OperatorWindow, told: Any, health: Any, state: str) -> None:
-    filled(window, told, health, state)
+def test_nothing_is_clipped(window: OperatorWindow, demo_session: Any, health: Any, state: str) -> None:
+    fill_window(window, demo_session, health, state)
     problems = {}
     for size in SIZES if state == "running" else FEW:
         settle(window, size)
@@ -121,17 +123,19 @@ def test_nothing_is_clipped(window: OperatorWindow, told: Any, health: Any, stat
         assert stop.height() >= 160
         assert window.rect().contains(place_of(stop, window))
         assert not scrolls(stop, window)
-    assert {size: found for size, found in problems.items() if found} == {}
+    assert {size: clipped for size, clipped in problems.items() if clipped} == {}
     assert unnamed(window) + dead(window) == []
 
 
-def test_the_shape_of_the_window_does_not_tell_whether_the_force_is_hidden(qtbot: Any, told: Any, health: Any) -> None:
+def test_the_shape_of_the_window_does_not_tell_whether_the_force_is_hidden(
+    qtbot: Any, demo_session: Any, health: Any
+) -> None:
     places = []
     for limit_n in (None, 6.0):
         window = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=False, force_limit_n=limit_n)
         qtbot.addWidget(window)
         window.show()
-        filled(window, told, health, "preparing")
+        fill_window(window, demo_session, health, "preparing")
         here = []
         for size in FEW:
             settle(window, size)
@@ -157,8 +161,8 @@ COLUMNS: dict[int, dict[str, Any]] = {
 }
 
 
-def test_each_width_of_the_window_has_its_columns_plots_and_icons(window: OperatorWindow, told: Any) -> None:
-    window.show_view(told.view())
+def test_each_width_of_the_window_has_its_columns_plots_and_icons(window: OperatorWindow, demo_session: Any) -> None:
+    window.show_view(demo_session.view())
     settle(window, (1066, 768))
     buttons = {button: button.sizeHint().width() for button in (window.buttons.pause, window.buttons.end)}
     parts = {"rail": window.rail, "middle": window.arrangement.middle_area, "bar": window.buttons}
@@ -184,11 +188,11 @@ def test_each_width_of_the_window_has_its_columns_plots_and_icons(window: Operat
     [(870, 250, 3, 5), (869, 236, 2, 3), (750, 236, 2, 3), (749, 236, 1, 2), (705, 236, 1, 2), (704, 236, 0, 2)],
 )
 def test_each_height_of_the_window_has_its_stop_notes_and_rows_of_the_device(
-    window: OperatorWindow, told: Any, height: int, stop_px: int, notes: int, rows: int
+    window: OperatorWindow, demo_session: Any, height: int, stop_px: int, notes: int, rows: int
 ) -> None:
     for text in ("First", "Second", "Third", "Fourth"):
-        told.tell("note", 5.0, kind="note", text=text)
-    view = told.view()
+        demo_session.tell("note", 5.0, kind="note", text=text)
+    view = demo_session.view()
     values = ["real-time", "1000 Hz", "0", "8 N", "falcon"]
     device = replace(view.device, rows=tuple((f"Property {number}", value) for number, value in enumerate(values)))
     window.show_view(replace(view, device=device))

@@ -1,4 +1,4 @@
-"""The operator's window draws a view and says what the operator asks for."""
+"""The operator's window draws a view and emits the operator's requests."""
 
 import sys
 from dataclasses import replace
@@ -21,22 +21,22 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def window(qtbot):
-    made = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True)
-    qtbot.addWidget(made)
-    made.show()
-    qtbot.waitExposed(made)
-    yield made
-    made.may_close = True
-    if made.question is not None:
-        made.question.reject()
-    made.close()
+    operator_window = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True)
+    qtbot.addWidget(operator_window)
+    operator_window.show()
+    qtbot.waitExposed(operator_window)
+    yield operator_window
+    operator_window.may_close = True
+    if operator_window.question is not None:
+        operator_window.question.reject()
+    operator_window.close()
 
 
 @pytest.fixture
-def running(window, told, health):
-    told.welcome()
-    told.start(1)
-    window.show_view(told.view(health))
+def running(window, demo_session, health):
+    demo_session.welcome()
+    demo_session.start(1)
+    window.show_view(demo_session.view(health))
     return window
 
 
@@ -46,44 +46,44 @@ def stops(what, _details):
 
 def test_escape_held_stops_the_force_and_a_tap_does_not(running, qtbot):
     handle = running.windowHandle()
-    asked = []
-    running.asked.connect(lambda *_asked: asked.append(True))
+    requests = []
+    running.asked.connect(lambda *_asked: requests.append(True))
     QTest.keyPress(handle, Qt.Key.Key_Escape)
     QTest.keyRelease(handle, Qt.Key.Key_Escape)
     assert not running.escape.findChild(QTimer).isActive()
-    assert asked == []
+    assert requests == []
     with qtbot.waitSignal(running.asked, timeout=HOLD_MS * 5, check_params_cb=stops):
         QTest.keyPress(handle, Qt.Key.Key_Escape)
     QTest.keyRelease(handle, Qt.Key.Key_Escape)
 
 
-def test_the_first_button_asks_to_pause_and_during_a_pause_to_resume(running, told, health):
+def test_the_first_button_asks_to_pause_and_during_a_pause_to_resume(running, demo_session, health):
     requests = []
     running.asked.connect(lambda request, _details: requests.append(request))
     running.buttons.pause.click()
-    told.tell("paused", by="operator")
-    running.show_view(told.view(health))
+    demo_session.tell("paused", by="operator")
+    running.show_view(demo_session.view(health))
     running.buttons.pause.click()
     assert requests == ["pause", "resume"]
 
 
-def test_a_question_about_a_trial_goes_with_the_trial(running, told, health, qtbot):
+def test_a_question_about_a_trial_goes_with_the_trial(running, demo_session, health, qtbot):
     running.ask_to_repeat()
-    told.end(1)
-    running.show_view(told.view(health))
+    demo_session.end(1)
+    running.show_view(demo_session.view(health))
     assert running.question is not None  # its statements are being answered
-    told.answer(1)
-    told.start(2)
+    demo_session.answer(1)
+    demo_session.start(2)
     with qtbot.assertNotEmitted(running.asked):
-        running.show_view(told.view(health))
+        running.show_view(demo_session.view(health))
     assert running.question is None
 
 
-def test_keyboard_is_on_close_session_once_the_session_is_over(running, told, health, qtbot):
+def test_keyboard_is_on_close_session_once_the_session_is_over(running, demo_session, health, qtbot):
     running.header.page.show()  # as where both windows share a screen
     running.buttons.end.setFocus()
-    told.tell("session_ended", status="aborted", reason="", fingerprint="wwww-mmmm-wwww")
-    running.show_view(told.view(health, force_on=False))
+    demo_session.tell("session_ended", status="aborted", reason="", fingerprint="wwww-mmmm-wwww")
+    running.show_view(demo_session.view(health, force_on=False))
     assert running.focusWidget() is running.buttons.close_session
     with qtbot.waitSignal(running.asked, check_params_cb=lambda what, _: what == "close"):
         qtbot.keyClick(running.focusWidget(), Qt.Key.Key_Return)
@@ -129,11 +129,11 @@ def test_repainting_the_live_plots_keeps_no_reference_to_none(running, health):
     assert abs(sys.getrefcount(None) - before) < 100
 
 
-def test_an_ended_session_that_waits_for_the_disk_says_that_the_window_stays_open(running, told, health):
-    told.tell("session_ended", status="completed", reason="", fingerprint="wwww-mmmm")
-    running.show_view(told.view(health, trouble="no space left on the disk", waits=True, force_on=False))
+def test_an_ended_session_that_waits_for_the_disk_asks_to_keep_the_window_open(running, demo_session, health):
+    demo_session.tell("session_ended", status="completed", reason="", fingerprint="wwww-mmmm")
+    running.show_view(demo_session.view(health, trouble="no space left on the disk", waits=True, force_on=False))
     assert "leave this window open" in running.banner.then.text()
-    running.show_view(told.view(health, trouble="the device stopped responding", force_on=False))
+    running.show_view(demo_session.view(health, trouble="the device stopped responding", force_on=False))
     assert running.banner.then.text().startswith("The session is closed")
 
 
@@ -147,8 +147,8 @@ STATES = {
 }
 
 
-def test_each_chip_of_the_header_shows_its_own_state(window, told, health):
-    header, view = window.header, told.view(health)
+def test_each_chip_of_the_header_shows_its_own_state(window, demo_session, health):
+    header, view = window.header, demo_session.view(health)
     for state, sign in STATES.items():
         window.show_view(replace(view, state=state, state_word=f"Word of {state}"))
         assert (header.state.tone, header.state.icon, header.state.word) == (*sign, f"Word of {state}")
@@ -185,8 +185,8 @@ def test_each_chip_of_the_header_shows_its_own_state(window, told, health):
         ({"may_repeat": False}, ""),
     ],
 )  # fmt: skip
-def test_the_hint_below_the_buttons_fits_the_state(window, told, health, facts, hint):
-    window.show_view(replace(told.view(health), **{"state": "running", **facts}))
+def test_the_hint_below_the_buttons_fits_the_state(window, demo_session, health, facts, hint):
+    window.show_view(replace(demo_session.view(health), **{"state": "running", **facts}))
     assert window.buttons.hint.text() == hint
 
 
@@ -195,56 +195,56 @@ def test_the_hint_below_the_buttons_fits_the_state(window, told, health, facts, 
     [
         ({}, "End the session, fix the cause, then start a new one.", False),
         ({"may_reconnect": True}, "Plug in the device, then reconnect it.", True),
-        ({"may_reconnect": True, "reconnection": "Looking …"}, "Looking …", True),
+        ({"may_reconnect": True, "reconnection": "Looking…"}, "Looking…", True),
         ({"waits": True}, "Free up some disk space or reconnect the drive. The session will then", False),
         ({"over": True, "may_reconnect": True}, "The session is closed and the force is off.", False),
         ({"over": True, "waits": True}, "leave this window open until", False),
     ],
 )
-def test_the_banner_of_a_fault_says_what_to_do(window, told, health, facts, advice, offered):
+def test_the_banner_of_a_fault_gives_advice(window, demo_session, health, facts, advice, offered):
     banner = window.banner
     for reconnects in (False, True):
-        shown = replace(told.view(health), trouble="the device is gone", reconnects=reconnects, **facts)
-        window.show_view(shown)
+        faulty_view = replace(demo_session.view(health), trouble="the device is gone", reconnects=reconnects, **facts)
+        window.show_view(faulty_view)
         assert banner.what.text() == "The device is gone"
         assert advice in banner.then.text()
         assert (banner.reconnect.isHidden(), banner.reconnect.isEnabled()) == (not offered, not reconnects)
-    window.show_view(replace(shown, trouble=""))
+    window.show_view(replace(faulty_view, trouble=""))
     assert banner.isHidden()
 
 
-def test_buttons_notes_and_counts_are_those_of_the_view(window, told, health):
+def test_buttons_notes_and_counts_follow_the_view(window, demo_session, health):
     buttons, notes, rail = window.buttons, window.notes, window.rail
-    told.tell("note", 5.0, kind="note", text="slow  hand")
-    told.tell("note", 70.0, kind="mark", text="")
-    shown = replace(
-        told.view(health),
+    demo_session.tell("note", 5.0, kind="note", text="slow  hand")
+    demo_session.tell("note", 70.0, kind="mark", text="")
+    shown_view = replace(
+        demo_session.view(health),
         trial_time=TrialTime(elapsed_s=30.0, least_s=15.0, most_s=60.0),
         beyond=("Newest", "Older"),
         counts=(("Answers on disk", "3 of 8"), ("Marks, repeats", "1, 2")),
     )
     for pauses, resumes, repeats, word in ((True, False, True, "Pause"), (False, True, False, "Resume")):
-        window.show_view(replace(shown, may_pause=pauses, may_resume=resumes, may_repeat=repeats))
+        window.show_view(replace(shown_view, may_pause=pauses, may_resume=resumes, may_repeat=repeats))
         assert (buttons.pause.text(), buttons.pause.isEnabled(), buttons.repeat.isEnabled()) == (word, True, repeats)
-    window.show_view(replace(shown, may_pause=False, may_resume=False))
+    window.show_view(replace(shown_view, may_pause=False, may_resume=False))
     assert not buttons.pause.isEnabled()
     assert [(row.sign.name, row.sign.ink, row.time.text(), row.text.accessibleName()) for row in notes.lines[:2]] == [
-        ("flag", "warn", clock_text(shown.notes[0].t_s), "Mark"),
-        ("pen", "text2", clock_text(shown.notes[0].t_s - 70), "slow hand"),
+        ("flag", "warn", clock_text(shown_view.notes[0].t_s), "Mark"),
+        ("pen", "text2", clock_text(shown_view.notes[0].t_s - 70), "slow hand"),
     ]
     assert notes.lines[2].isHidden()
-    assert [(name.text(), value.text()) for name, value in rail.tally.counts] == list(shown.counts)
+    assert [(name.text(), value.text()) for name, value in rail.tally.counts] == list(shown_view.counts)
     assert (rail.tally.beyond.text(), rail.tally.beyond.toolTip()) == ("Newest.", "Newest\nOlder")
     assert (rail.now.elapsed.text(), rail.now.least.text()) == ("0:30 of 1:00", "at least 0:15")
     assert (rail.now.bar.share, rail.now.bar.tick) == (0.5, 0.25)
     for over in (False, True):
-        window.show_view(replace(shown, over=over, state="ended" if over else "running"))
+        window.show_view(replace(shown_view, over=over, state="ended" if over else "running"))
         assert [part.isEnabled() for part in (notes.add, notes.mark, notes.field)] == [not over] * 3
         assert [part.isHidden() for part in (buttons.pause, buttons.repeat, buttons.end)] == [over] * 3
         assert buttons.close_session.isHidden() == (not over)
 
 
-def test_enter_adds_the_note_shift_enter_a_line_and_each_button_asks_for_what_it_says(running, qtbot):
+def test_enter_adds_the_note_shift_enter_a_line_and_each_button_sends_its_request(running, qtbot):
     requests = []
     running.asked.connect(lambda request, _details: requests.append(request))
     written, notes = [], running.notes
@@ -261,7 +261,7 @@ def test_enter_adds_the_note_shift_enter_a_line_and_each_button_asks_for_what_it
     assert requests == ["note"]
     for button, text, request in (
         (notes.mark, "Mark", "mark"),
-        (running.device.diagnose, "Diagnose …", "diagnose"),
+        (running.device.diagnose, "Diagnose…", "diagnose"),
         (running.stop.fade_in, "Fade in again", "resume"),
     ):
         requests.clear()

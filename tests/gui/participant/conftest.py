@@ -17,35 +17,35 @@ from tests.gui.small import task_page
 
 @pytest.fixture(autouse=True)
 def early_clicks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let pages take clicks at once; how long they ignore them is tested with the key presses."""
+    """Let pages accept clicks at once; the delay is tested with the key presses."""
     monkeypatch.setattr(key_presses, "CLICK_MS", 0)
 
 
 @pytest.fixture
 def opening(qtbot: Any) -> Iterator[Callable[..., Participant]]:
     """Return a function that opens a window, which is closed after the test."""
-    made: list[Participant] = []
+    participants: list[Participant] = []
 
     def open_(*arguments: Any, **named: Any) -> Participant:
-        made.append(Participant(qtbot, *arguments, **named))
-        return made[-1]
+        participants.append(Participant(qtbot, *arguments, **named))
+        return participants[-1]
 
     yield open_
-    for one in made:
-        one.close()
+    for participant in participants:
+        participant.close()
 
 
 @pytest.fixture
-def opened(opening: Callable[..., Participant]) -> Participant:
+def participant(opening: Callable[..., Participant]) -> Participant:
     return opening()
 
 
 @pytest.fixture
 def captured(opening: Callable[..., Participant]) -> Iterator[Participant]:
-    made = opening(captures_pointer=True)
-    yield made
-    made.close()
-    assert not made.window.findChild(PointerCapture).is_held
+    participant = opening(captures_pointer=True)
+    yield participant
+    participant.close()
+    assert not participant.window.findChild(PointerCapture).is_held
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def finger() -> QPointingDevice:
 
 
 @pytest.fixture
-def made(qtbot: Any) -> Callable[..., TankWidget]:
+def make_tank(qtbot: Any) -> Callable[..., TankWidget]:
     def make(page: Any = None, size: tuple[int, int] = (960, 640), language: str = "en", **named: Any) -> TankWidget:
         widget = TankWidget(page or task_page(), words(language), **named)
         qtbot.addWidget(widget)

@@ -23,7 +23,7 @@ KEY = Qt.Key
 
 
 class Participant:
-    """The window on a screen, and what it told; without a size it has that of a pilot."""
+    """The window on a screen and its events; by default it has the size of a pilot."""
 
     def __init__(
         self,
@@ -71,7 +71,7 @@ class Participant:
 
     @property
     def page(self) -> Any:
-        """The widget of the page."""
+        """Return the widget of the page."""
         return self.window.widget
 
     @property
@@ -80,7 +80,7 @@ class Participant:
 
     @property
     def told(self) -> list[Any]:
-        """The events but for those that say what was shown."""
+        """Return the events except `ItemShown`."""
         return [event for event in self.events if not isinstance(event, ItemShown)]
 
     @property
@@ -89,9 +89,9 @@ class Participant:
 
     @property
     def texts(self) -> str:
-        """The words of all labels and buttons of the page."""
-        shown = (one for kind in (QLabel, QAbstractButton) for one in self.page.findChildren(kind))
-        return " ".join(one.text() for one in shown)
+        """Return the texts of all labels and buttons of the page."""
+        widgets = (widget for kind in (QLabel, QAbstractButton) for widget in self.page.findChildren(kind))
+        return " ".join(widget.text() for widget in widgets)
 
     @property
     def focus(self) -> QWidget:
@@ -99,10 +99,10 @@ class Participant:
 
     def question(self, number: int) -> Any:
         """Return the question with a number."""
-        return next(one for one in self.page.fields if one.accessibleName().startswith(f"{number}. "))
+        return next(field for field in self.page.fields if field.accessibleName().startswith(f"{number}. "))
 
     def find(self, name: str, question: int | None = None) -> QAbstractButton:
-        """Return the button that is shown with these words, or has this name, on the page or in a question."""
+        """Return the button with this text or name on the page or in a question."""
         inside = self.page if question is None else self.question(question)
         for button in inside.findChildren(QAbstractButton):
             if button.isVisible() and name in (button.text(), button.accessibleName()):
@@ -110,7 +110,7 @@ class Participant:
         raise LookupError(name)
 
     def press(self, *keys: KEY) -> None:
-        """Press keys where the keyboard is."""
+        """Press keys on the focused widget."""
         for key in keys:
             QTest.keyClick(self.focus, key)
         QApplication.processEvents()
@@ -144,7 +144,7 @@ def tap(finger: QPointingDevice, widget: QWidget, place: QPoint | None = None) -
 
 
 def told_of(widget: Any) -> Any:
-    """Return what a screen reader finds of a widget."""
+    """Return the accessibility interface of a widget."""
     return QAccessible.queryAccessibleInterface(widget)
 
 
@@ -160,8 +160,8 @@ def on_a_display(script: str) -> Any:
     """Run a script with a virtual display, and return the JSON of its last line."""
     with virtual_display() as display:
         environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "PYTHONPATH": str(ROOT)}
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", script], env=environment, cwd=ROOT, capture_output=True, text=True, check=False
         )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    assert process.returncode == 0, process.stderr
+    return json.loads(process.stdout.splitlines()[-1])

@@ -1,4 +1,4 @@
-"""What is felt, and how late it is seen, can be told from no picture: the same motion looks the same in every trial."""
+"""No picture reveals the felt liquid or the visual delay: the same motion looks the same in every trial."""
 
 import math
 from collections.abc import Callable
@@ -35,7 +35,7 @@ def protocol() -> Protocol:
 
 
 class Held:
-    """A session up to the first trial of a block, in a condition of our choice."""
+    """A session up to the first trial of a block, in a given condition."""
 
     def __init__(self, protocol: Protocol, block: str, condition: str) -> None:
         schedule = build_schedule(protocol, "P001", 1)
@@ -61,7 +61,7 @@ class Held:
         self.page = page
 
     def _pass(self) -> None:
-        """Go on from a page that we do not look at."""
+        """Continue past a page that is not checked."""
         match self.page:
             case TextPage():
                 self.runner.post(Continue(self.clock()))
@@ -73,7 +73,7 @@ class Held:
                 self.runner.post(Submitted(self.clock()))
 
     def move(self) -> None:
-        """Sway from target to target and stay there for a while, the same in every condition."""
+        """Move from target to target with pauses, in the same way for every condition."""
         for step in range(round((LASTS_S + self.delay_s) / STEP_S)):
             turn = math.tau * step * STEP_S / 2.4
             x = max(-0.030, min(0.030, 0.055 * math.sin(turn)))
@@ -81,18 +81,18 @@ class Held:
             self.runner.poll()
 
     def pictures(self, window: ParticipantWindow) -> list[QImage]:
-        """Return what the participant sees of the motion at the moments to look at, however late that is."""
+        """Return the participant's pictures of the motion at `LOOKS_S`, each after the visual delay."""
         assert isinstance(self.page, TaskPage)
         window.show_page(self.page)
-        seen = []
+        images = []
         for look_s in LOOKS_S:
             now_ns = self.began_ns + round((look_s + self.delay_s + SETTLED_S) * 1e9)
             view = self.runner.view(now_ns)
             assert view is not None
             window.show_view(view)
             QApplication.processEvents()
-            seen.append(window.grab().toImage())
-        return seen
+            images.append(window.grab().toImage())
+        return images
 
 
 @pytest.mark.parametrize(
@@ -103,13 +103,13 @@ def test_the_same_motion_makes_the_same_pixels_in_every_condition(
     opening: Callable[..., Participant], protocol: Protocol, block: str, conditions: tuple[str, ...]
 ) -> None:
     window = opening(size=(1024, 640)).window
-    found: list[tuple[Page | None, list[QImage]]] = []
+    by_condition: list[tuple[Page | None, list[QImage]]] = []
     for condition in conditions:
         held = Held(protocol, block, condition)
         held.move()
-        found.append((held.page, held.pictures(window)))
-    page, pictures = found[0]
-    assert all(one != other for one, other in pairwise(pictures))  # the motion is seen
-    for other_page, others in found[1:]:
+        by_condition.append((held.page, held.pictures(window)))
+    page, pictures = by_condition[0]
+    assert all(picture != next_picture for picture, next_picture in pairwise(pictures))  # the motion is seen
+    for other_page, others in by_condition[1:]:
         assert other_page == page
         assert others == pictures

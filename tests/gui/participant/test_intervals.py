@@ -1,4 +1,4 @@
-"""The pages of a design's one question, feedback, and the controls where a level is set."""
+"""The pages of a trial design's question, feedback, and the controls for setting a level."""
 
 import time
 from collections.abc import Callable
@@ -27,8 +27,8 @@ FULL, SMALL = (1366, 768), (1024, 640)
 NONE = Qt.KeyboardModifier.NoModifier
 
 
-def values(seen: Participant) -> list[Any]:
-    return [value for _, value in seen.answers]
+def values(participant: Participant) -> list[Any]:
+    return [value for _, value in participant.answers]
 
 
 @pytest.mark.parametrize(
@@ -44,55 +44,53 @@ def values(seen: Participant) -> list[Any]:
     ],
 )
 def test_one_key_answers_and_continues_once(opening: Opening, key: KEY, language: str, value: str) -> None:
-    seen = opening(choice(language=language), FULL, language)
-    first, second = (seen.find(words(language).design_answers[name]) for name in ORDINALS[:2])
+    participant = opening(choice(language=language), FULL, language)
+    first, second = (participant.find(words(language).design_answers[name]) for name in ORDINALS[:2])
     assert (first.x() > second.x()) == (language == "ar")
     held = QKeyEvent(QEvent.Type.KeyPress, KEY.Key_2, NONE, "2", True)
-    QApplication.sendEvent(seen.page, held)
-    assert values(seen) == [], "a key that is held from the page before"
-    seen.press(key, KEY.Key_2)
-    assert values(seen) == [value]
-    assert seen.kinds.count(Submitted) == 1
+    QApplication.sendEvent(participant.page, held)
+    assert values(participant) == [], "a key that is held from the page before"
+    participant.press(key, KEY.Key_2)
+    assert values(participant) == [value]
+    assert participant.kinds.count(Submitted) == 1
 
 
 @pytest.mark.parametrize(("language", "on", "back"), [("en", "Right", "Left"), ("ar", "Left", "Right")])
 def test_each_arrow_goes_to_the_next_of_three_answers_and_enter_chooses_it(
     opening: Opening, language: str, on: str, back: str
 ) -> None:
-    seen, passed = opening(choice(3, language), FULL, language), []
+    participant, passed = opening(choice(3, language), FULL, language), []
     for way in (on, on, on, on, back):
-        seen.press(KEY[f"Key_{way}"])
-        passed.append(seen.focus.accessibleName())
+        participant.press(KEY[f"Key_{way}"])
+        passed.append(participant.focus.accessibleName())
     assert passed == [words(language).design_answers[ORDINALS[at]] for at in (0, 1, 2, 0, 2)]
-    seen.press(KEY.Key_Return)
-    assert (values(seen), seen.kinds.count(Submitted)) == ([ORDINALS[2]], 1)
+    participant.press(KEY.Key_Return)
+    assert (values(participant), participant.kinds.count(Submitted)) == ([ORDINALS[2]], 1)
 
 
 @pytest.mark.parametrize("typed", ["12", "2.5", "2,5", "1e3", "", "0", "-3", "many", "nan", "inf", "1e400"])
-def test_a_number_above_0_is_taken_and_anything_else_is_reported(opening: Opening, typed: str) -> None:
-    taken = {"12": [12], "2.5": [2.5], "2,5": [2.5], "1e3": [1000]}.get(typed, [])
-    seen = opening(number(), FULL)
-    seen.type(typed)
-    seen.press(KEY.Key_Return)
-    assert values(seen) == taken
-    assert ("Enter a number above 0." in seen.texts) is (taken == [])
-    if not taken:
-        seen.type("4")
-        assert "Enter a number above 0." not in seen.texts
+def test_a_positive_number_is_accepted_and_other_input_is_reported(opening: Opening, typed: str) -> None:
+    accepted = {"12": [12], "2.5": [2.5], "2,5": [2.5], "1e3": [1000]}.get(typed, [])
+    participant = opening(number(), FULL)
+    participant.type(typed)
+    participant.press(KEY.Key_Return)
+    assert values(participant) == accepted
+    assert participant.texts.count("Enter a number above 0.") == (1 if accepted else 2)  # the question, and the refusal
+    if not accepted:
+        participant.type("4")
+        assert participant.texts.count("Enter a number above 0.") == 1
 
 
 @pytest.mark.parametrize(("language", "typed"), [("en", "2,500"), ("de", "2.500")])
-def test_an_estimate_that_can_be_read_in_two_ways_is_asked_for_again(
-    opening: Opening, language: str, typed: str
-) -> None:
-    seen = opening(number(), FULL, language)
-    seen.type(typed)
-    seen.press(KEY.Key_Return)
-    assert values(seen) == []
-    assert words(language).unclear_number(typed) in seen.texts
-    seen.type("2500")
-    seen.press(KEY.Key_Return)
-    assert values(seen) == [2500]
+def test_an_ambiguous_estimate_is_requested_again(opening: Opening, language: str, typed: str) -> None:
+    participant = opening(number(), FULL, language)
+    participant.type(typed)
+    participant.press(KEY.Key_Return)
+    assert values(participant) == []
+    assert words(language).unclear_number(typed) in participant.texts
+    participant.type("2500")
+    participant.press(KEY.Key_Return)
+    assert values(participant) == [2500]
 
 
 def interval(*, adjusts: bool = False, language: str = "en", resting: bool = False) -> TaskPage:
@@ -103,50 +101,50 @@ def interval(*, adjusts: bool = False, language: str = "en", resting: bool = Fal
     return replace(task_page(task, question=question, interval=Interval(at, 2, resting, announced)), adjusts=adjusts)
 
 
-def setting(seen: Participant, language: str = "en") -> Any:
-    """Show the standard, the rest and the interval that is set, as a session does; return the controls."""
+def setting(participant: Participant, language: str = "en") -> Any:
+    """Show standard, rest and adjustable interval as a session does; return the controls."""
     for page in (interval(language=language), interval(resting=True), interval(adjusts=True, language=language)):
-        seen.window.show_page(page)
+        participant.window.show_page(page)
         QApplication.processEvents()
-    return seen.page.controls
+    return participant.page.controls
 
 
-def steps(seen: Participant) -> list[int]:
-    return [event.steps for event in seen.events if isinstance(event, Stepped)]
+def steps(participant: Participant) -> list[int]:
+    return [event.steps for event in participant.events if isinstance(event, Stepped)]
 
 
-def test_a_key_that_is_held_steps_eight_times_a_second_and_stops_with_it(opened: Participant, qtbot: Any) -> None:
-    setting(opened)
-    QTest.keyPress(opened.window, KEY.Key_Right)
+def test_a_key_that_is_held_steps_eight_times_a_second_and_stops_with_it(participant: Participant, qtbot: Any) -> None:
+    setting(participant)
+    QTest.keyPress(participant.window, KEY.Key_Right)
     for _ in range(20):  # the system's own repetition, 30 a second or another rate
-        QApplication.sendEvent(opened.window, QKeyEvent(QEvent.Type.KeyPress, KEY.Key_Right, NONE, "", True))
-    assert steps(opened) == [1]
+        QApplication.sendEvent(participant.window, QKeyEvent(QEvent.Type.KeyPress, KEY.Key_Right, NONE, "", True))
+    assert steps(participant) == [1]
     began_s = time.perf_counter()
-    qtbot.waitUntil(lambda: len(steps(opened)) >= 5)
+    qtbot.waitUntil(lambda: len(steps(participant)) >= 5)
     assert time.perf_counter() - began_s >= 0.95 * 4 * STEP_MS / 1000
-    QTest.keyPress(opened.window, KEY.Key_Left)
-    QTest.keyRelease(opened.window, KEY.Key_Right)
-    right = len(steps(opened))
-    qtbot.waitUntil(lambda: len(steps(opened)) >= right + 2)
-    QTest.keyRelease(opened.window, KEY.Key_Left)
-    held = len(steps(opened))
+    QTest.keyPress(participant.window, KEY.Key_Left)
+    QTest.keyRelease(participant.window, KEY.Key_Right)
+    right = len(steps(participant))
+    qtbot.waitUntil(lambda: len(steps(participant)) >= right + 2)
+    QTest.keyRelease(participant.window, KEY.Key_Left)
+    held = len(steps(participant))
     qtbot.wait(3 * STEP_MS)
-    assert len(steps(opened)) == held
-    assert set(steps(opened)[: right - 1]) == {1}
-    assert set(steps(opened)[right:]) == {-1}, "letting go of one arrow keeps the other"
+    assert len(steps(participant)) == held
+    assert set(steps(participant)[: right - 1]) == {1}
+    assert set(steps(participant)[right:]) == {-1}, "letting go of one arrow keeps the other"
 
 
-def test_nothing_steps_in_the_rest_that_follows(opened: Participant, qtbot: Any) -> None:
-    setting(opened)
-    QTest.keyPress(opened.window, KEY.Key_Right)
-    opened.window.show_page(interval(resting=True))
-    before = len(steps(opened))
+def test_nothing_steps_in_the_rest_that_follows(participant: Participant, qtbot: Any) -> None:
+    setting(participant)
+    QTest.keyPress(participant.window, KEY.Key_Right)
+    participant.window.show_page(interval(resting=True))
+    before = len(steps(participant))
     qtbot.wait(3 * STEP_MS)
-    QTest.keyClick(opened.window, KEY.Key_Left)
-    QTest.keyClick(opened.window, KEY.Key_Return)
-    QApplication.sendEvent(opened.window, wheel(opened.page, 120))
-    assert len(steps(opened)) == before
-    assert Submitted not in opened.kinds
+    QTest.keyClick(participant.window, KEY.Key_Left)
+    QTest.keyClick(participant.window, KEY.Key_Return)
+    QApplication.sendEvent(participant.window, wheel(participant.page, 120))
+    assert len(steps(participant)) == before
+    assert Submitted not in participant.kinds
 
 
 def wheel(widget: QWidget, eighths: int) -> QWheelEvent:
@@ -157,38 +155,38 @@ def wheel(widget: QWidget, eighths: int) -> QWheelEvent:
     )
 
 
-def test_arrows_and_the_wheel_step_at_once_forwards_more_and_enter_confirms(opened: Participant) -> None:
-    setting(opened)
-    opened.press(*[KEY.Key_Right] * 3, KEY.Key_Left)
-    unheard = wheel(opened.page, 120)
-    QApplication.sendEvent(opened.page, unheard)
+def test_arrows_and_the_wheel_step_at_once_forwards_more_and_enter_confirms(participant: Participant) -> None:
+    setting(participant)
+    participant.press(*[KEY.Key_Right] * 3, KEY.Key_Left)
+    unheard = wheel(participant.page, 120)
+    QApplication.sendEvent(participant.page, unheard)
     assert not unheard.isAccepted()  # Qt gives it to the window
     for turned in (120, -240, *[30] * 4):  # a touchpad's turns are smaller
-        QApplication.sendEvent(opened.window, wheel(opened.page, turned))
-    assert steps(opened) == [1, 1, 1, -1, 1, -2, 1]
-    opened.press(KEY.Key_Return)
-    assert opened.kinds[-1] is Submitted
-    opened.press(KEY.Key_Space)
-    assert Continue not in opened.kinds
+        QApplication.sendEvent(participant.window, wheel(participant.page, turned))
+    assert steps(participant) == [1, 1, 1, -1, 1, -2, 1]
+    participant.press(KEY.Key_Return)
+    assert participant.kinds[-1] is Submitted
+    participant.press(KEY.Key_Space)
+    assert Continue not in participant.kinds
 
 
-def test_the_mouse_presses_and_holds_the_buttons(opened: Participant, qtbot: Any) -> None:
-    controls = setting(opened)
-    opened.click(controls.less)
-    opened.click(controls.more)
-    assert steps(opened) == [-1, 1]
+def test_the_mouse_presses_and_holds_the_buttons(participant: Participant, qtbot: Any) -> None:
+    controls = setting(participant)
+    participant.click(controls.less)
+    participant.click(controls.more)
+    assert steps(participant) == [-1, 1]
     qtbot.mousePress(controls.more, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: len(steps(opened)) >= 4)
+    qtbot.waitUntil(lambda: len(steps(participant)) >= 4)
     qtbot.mouseRelease(controls.more, Qt.MouseButton.LeftButton)
-    assert set(steps(opened)[1:]) == {1}
-    opened.click(controls.done)
-    assert opened.kinds[-1] is Submitted
-    assert opened.window.hasFocus()
-    QTest.keyClick(opened.window, KEY.Key_Escape)
-    qtbot.waitUntil(lambda: PauseRequested in opened.kinds)
+    assert set(steps(participant)[1:]) == {1}
+    participant.click(controls.done)
+    assert participant.kinds[-1] is Submitted
+    assert participant.window.hasFocus()
+    QTest.keyClick(participant.window, KEY.Key_Escape)
+    qtbot.waitUntil(lambda: PauseRequested in participant.kinds)
 
 
-def test_where_the_mouse_is_the_device_keys_are_named_and_no_button_is_shown(captured: Participant) -> None:
+def test_with_the_mouse_as_device_keys_are_named_and_buttons_hidden(captured: Participant) -> None:
     controls = setting(captured)
     captured.window.show_view(view(lit=0, target_m=(0.0, 0.0, 0.0)))
     assert controls.isHidden()
@@ -204,17 +202,17 @@ def test_where_the_mouse_is_the_device_keys_are_named_and_no_button_is_shown(cap
 def test_buttons_are_within_the_window_large_enough_and_cover_no_word(
     opening: Opening, language: str, size: tuple[int, int], text_scale: float
 ) -> None:
-    seen = opening(None, size, language, text_scale)
-    controls = setting(seen, language)
-    seen.window.show_view(view(lit=0, target_m=(0.0, 0.0, 0.0)))
-    seen.settle()
-    assert seen.page.rect().contains(controls.geometry())
+    participant = opening(None, size, language, text_scale)
+    controls = setting(participant, language)
+    participant.window.show_view(view(lit=0, target_m=(0.0, 0.0, 0.0)))
+    participant.settle()
+    assert participant.page.rect().contains(controls.geometry())
     buttons = (controls.less, controls.more, controls.done)
     assert min(min(button.height(), button.width()) for button in buttons) >= 44
     assert controls.less.x() < controls.more.x() < controls.done.x()
     covered = controls.geometry()
     controls.move(-covered.width(), 0)
-    below = seen.page.grab(covered).toImage().convertToFormat(QImage.Format.Format_Grayscale8)
+    below = participant.page.grab(covered).toImage().convertToFormat(QImage.Format.Format_Grayscale8)
     greys = np.frombuffer(below.constBits(), np.uint8).reshape(below.height(), -1)[:, : below.width()]
     assert int(greys.max()) - int(greys.min()) < 40, "a word is below the controls"
 

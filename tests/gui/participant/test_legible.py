@@ -1,4 +1,4 @@
-"""Contrast, sizes and places of what the participant reads and hits, taken from the real widgets."""
+"""Contrast, sizes and positions of texts and targets on the participant's pages, measured on real widgets."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -36,7 +36,7 @@ PARAGRAPHS = ("In this study you move a small ball through simulated liquids and
 
 
 def pages() -> dict[str, Page]:
-    """Return one page of each kind, as full as it can be."""
+    """Return one page of each kind with all optional parts."""
     part = Progress(part=1, parts=2, label="", index=4, of=3)
     return {
         "consent": text_page("consent", paragraphs=PARAGRAPHS, languages=("en", "nl", "de", "fr", "ar")),
@@ -54,18 +54,18 @@ def pages() -> dict[str, Page]:
     }
 
 
-def show(seen: Participant, page: Page) -> None:
-    """Show a page with everything on it that can be: ball and ring, what is missing, what is pointed at."""
-    window = seen.window
-    seen.show(page)
+def show(participant: Participant, page: Page) -> None:
+    """Show a page with all optional parts: ball, ring, notes on missing answers and a pointed option."""
+    window = participant.window
+    participant.show(page)
     if window.tank is not None:
         lit = 1 if page == pages()["reach"] else None
         window.show_view(view((0.02, 0.0, 0.0), lit=lit, dwell=0.6, elapsed_s=3.0))
     if isinstance(page, NumberPage):
-        seen.press(KEY.Key_Return)  # what is wrong is reported
+        participant.press(KEY.Key_Return)  # what is wrong is reported
     if isinstance(page, QuestionnairePage):
-        seen.page.submit()
-        QTest.mouseMove([row for row in seen.page.fields if row.isVisible()][-1].options[2])
+        participant.page.submit()
+        QTest.mouseMove([row for row in participant.page.fields if row.isVisible()][-1].options[2])
     QApplication.processEvents()
 
 
@@ -80,7 +80,7 @@ def luminances(image: QImage) -> np.ndarray:
 
 
 def contrast(light: np.ndarray, place: QRect) -> float:
-    """Return the contrast of the strongest ink in a place to its ground, the luminance that most of it has."""
+    """Return the contrast of the strongest ink in a region to its background, the most frequent luminance."""
     part = light[max(place.top(), 0) : place.bottom() + 1, max(place.left(), 0) : place.right() + 1]
     values, counts = np.unique(np.round(part, 3), return_counts=True)
     ground = values[counts.argmax()]
@@ -92,28 +92,28 @@ def contrast(light: np.ndarray, place: QRect) -> float:
 @pytest.mark.parametrize("name", pages())
 @pytest.mark.parametrize("size", SIZES, ids=str)
 def test_every_word_stands_out_from_its_ground(opening: Opening, size: tuple[int, int], name: str) -> None:
-    seen = opening(size=size)
-    show(seen, pages()[name])
-    found = drawn_by(seen.window)
-    light = luminances(seen.window.grab().toImage())
-    assert found
-    weak = {one.text: contrast(light, one.ink.toAlignedRect()) for one in found}
+    participant = opening(size=size)
+    show(participant, pages()[name])
+    texts = drawn_by(participant.window)
+    light = luminances(participant.window.grab().toImage())
+    assert texts
+    weak = {drawn.text: contrast(light, drawn.ink.toAlignedRect()) for drawn in texts}
     assert {text: ratio for text, ratio in weak.items() if ratio < 4.5} == {}
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
 def test_edges_of_cells_and_the_ring_of_the_keyboard_stand_out(opening: Opening, size: tuple[int, int]) -> None:
-    seen = opening(size=size)
-    show(seen, pages()["answers"])
-    window = seen.window
+    participant = opening(size=size)
+    show(participant, pages()["answers"])
+    window = participant.window
     light = luminances(window.grab().toImage())
-    for cell in (cell for row in seen.page.fields for cell in row.options):
+    for cell in (cell for row in participant.page.fields for cell in row.options):
         if cell.accessibleName() == "Cannot judge" and not cell.isChecked():
             continue  # its dashes are tested with the words beside them: the column has a name and a dash
         middle = cell.mapTo(window, cell.rect().center())
         left = cell.mapTo(window, QPoint(0, 0)).x()
         assert contrast(light, QRect(left - 4, middle.y(), 12, 1)) >= 3.0, cell.accessibleName()
-    row = next(row for row in seen.page.fields if row.hasFocus())
+    row = next(row for row in participant.page.fields if row.hasFocus())
     top = row.mapTo(window, QPoint(row.width() // 2, 0))
     assert contrast(light, QRect(top.x(), top.y() - 3, 1, 8)) >= 3.0
 
@@ -122,18 +122,18 @@ def test_edges_of_cells_and_the_ring_of_the_keyboard_stand_out(opening: Opening,
 @pytest.mark.parametrize("name", pages())
 @pytest.mark.parametrize("size", [*SIZES, (1024, 640), (880, 640)], ids=str)
 def test_whatever_can_be_hit_is_44_px_high_and_wide(opening: Opening, size: tuple[int, int], name: str) -> None:
-    seen = opening(size=size)
-    show(seen, pages()[name])
-    window = seen.window
+    participant = opening(size=size)
+    show(participant, pages()[name])
+    window = participant.window
     kinds = (QAbstractButton, QLineEdit)
-    targets = [one for kind in kinds for one in window.findChildren(kind) if one.isVisible()]
+    targets = [widget for kind in kinds for widget in window.findChildren(kind) if widget.isVisible()]
     for target in targets:
         ring = 8 if type(target).__name__ in {"GoButton", "LanguageButton"} else 0
         assert min(target.width(), target.height()) - ring >= 44, target.accessibleName() or target.text()
         place = QRect(target.mapTo(window, QPoint(0, 0)), target.size())
         assert window.rect().contains(place)
-    for one, other in combinations(targets, 2):
-        here, there = (QRect(part.mapTo(window, QPoint(0, 0)), part.size()) for part in (one, other))
+    for first, second in combinations(targets, 2):
+        here, there = (QRect(part.mapTo(window, QPoint(0, 0)), part.size()) for part in (first, second))
         assert not here.intersects(there)
 
 
@@ -154,15 +154,15 @@ ARABIC_LABELS = (
 ARABIC = "يتصرف السائل كما أتوقع في كل الاتجاهات."
 
 
-def misplaced(window: ParticipantWindow, found: list[Drawn]) -> list[str]:
-    """Return which words are cut, run out of the window or into others."""
-    wrong = [f"cut: {one.text}" for one in found if not one.room.adjusted(-2, -2, 2, 2).contains(one.ink)]
+def misplaced(window: ParticipantWindow, texts: list[Drawn]) -> list[str]:
+    """Return the texts that are cut off, leave the window or overlap others."""
+    wrong = [f"cut: {drawn.text}" for drawn in texts if not drawn.room.adjusted(-2, -2, 2, 2).contains(drawn.ink)]
     inside = QRectF(window.rect())
-    wrong += [f"outside: {one.text}" for one in found if not inside.contains(one.ink)]
-    for one, other in combinations(found, 2):
-        shared = one.ink.intersected(other.ink)
+    wrong += [f"outside: {drawn.text}" for drawn in texts if not inside.contains(drawn.ink)]
+    for first, second in combinations(texts, 2):
+        shared = first.ink.intersected(second.ink)
         if min(shared.width(), shared.height()) > 2:
-            wrong.append(f"{one.text} × {other.text}")
+            wrong.append(f"{first.text} × {second.text}")
     return wrong
 
 
@@ -187,14 +187,14 @@ def test_no_word_is_cut_or_runs_into_another(
         page = {"choice": choice(4, said), "number": number(said)}[name]
     if name == "break":
         page = replace(page, language="ar" if said == "ar" else "en")  # type: ignore[type-var]
-    seen = opening(None, size, said, text_scale)
-    show(seen, page)
-    assert misplaced(seen.window, drawn_by(seen.window)) == []
+    participant = opening(None, size, said, text_scale)
+    show(participant, page)
+    assert misplaced(participant.window, drawn_by(participant.window)) == []
 
 
 @pytest.mark.parametrize("said", ["en", "de", "ar"])
-def test_in_a_narrow_window_two_lines_of_instruction_do_not_touch_what_is_below(opening: Opening, said: str) -> None:
-    seen = opening(None, (880, 420), said, 1.0)
+def test_in_a_narrow_window_two_lines_of_instruction_do_not_overlap_the_tank(opening: Opening, said: str) -> None:
+    participant = opening(None, (880, 420), said, 1.0)
     long = "Move the ball through the liquid in all directions, slowly and fast, and feel what it does to your arm."
-    show(seen, task_page(explore(), instruction=long))
-    assert misplaced(seen.window, drawn_by(seen.window)) == []
+    show(participant, task_page(explore(), instruction=long))
+    assert misplaced(participant.window, drawn_by(participant.window)) == []

@@ -1,4 +1,4 @@
-"""The tank on an OpenGL surface, on a virtual display: the same picture, a swap for every frame, frames in step."""
+"""The tank on an OpenGL surface of a virtual display: same picture, one swap per frame, frames in step with swaps."""
 
 import pytest
 
@@ -25,59 +25,58 @@ from tests.gui.drawn import pixels
 
 sys.excepthook = lambda *error: (sys.__excepthook__(*error), os._exit(1))
 app = QApplication([])
-told = {{"renderer": opengl_renderer(), "card": has_graphics_card(), "painted": [], "swaps": 0}}
-if told["renderer"] is None:
-    print(json.dumps(told)); sys.exit()
+result = {{"renderer": opengl_renderer(), "card": has_graphics_card(), "painted": [], "swaps": 0}}
+if result["renderer"] is None:
+    print(json.dumps(result)); sys.exit()
 tanks = [TankWidget(task_page(), words("en"), on_card=on_card) for on_card in (False, True)]
 plain, tank = tanks
-for one in tanks:
-    one.resize(960, 640)
-    one.show()
+for each_tank in tanks:
+    each_tank.resize(960, 640)
+    each_tank.show()
 frames = Frames(60.0)
 loop = QEventLoop()
-tank.painted.connect(told["painted"].append)
+tank.painted.connect(result["painted"].append)
 tank.swapped.connect(frames.note_swap)
 def swapped():
-    told["swaps"] += 1
+    result["swaps"] += 1
 tank.swapped.connect(swapped)
-shown = []
 def due():
-    told["locked"] = frames.is_locked
-    if len(told["painted"]) == {FRAMES}:
+    result["locked"] = frames.is_locked
+    if len(result["painted"]) == {FRAMES}:
         frames.stop(); loop.quit(); return
-    place = (0.001 * len(told["painted"]), 0.0, 0.0)
-    for one in tanks:
-        one.show_view(view(place, sample_ns=len(told["painted"])))
+    place = (0.001 * len(result["painted"]), 0.0, 0.0)
+    for each_tank in tanks:
+        each_tank.show_view(view(place, sample_ns=len(result["painted"])))
 frames.due.connect(due)
 frames.start()
 QTimer.singleShot(60_000, loop.quit)
 loop.exec()
-seen, drawn = pixels(tank.grab().toImage()).astype(int), pixels(plain.grab().toImage()).astype(int)
-told["apart"] = [float((np.abs(seen - drawn) > 60).any(2).mean()), float(np.abs(seen - drawn).mean())]
-print(json.dumps(told))
+surface, drawn = pixels(tank.grab().toImage()).astype(int), pixels(plain.grab().toImage()).astype(int)
+result["apart"] = [float((np.abs(surface - drawn) > 60).any(2).mean()), float(np.abs(surface - drawn).mean())]
+print(json.dumps(result))
 """
 
 
 @pytest.fixture(scope="module")
-def told():
-    found = on_a_display(SCRIPT)
-    if found["renderer"] is None:
+def result():
+    measured = on_a_display(SCRIPT)
+    if measured["renderer"] is None:
         pytest.skip("no OpenGL on this display")
-    return found
+    return measured
 
 
 @needs_display
 @pytest.mark.xvfb
-def test_the_picture_on_a_surface_is_the_same_and_every_view_is_told_of_once_after_its_swap(told):
-    share, mean = told["apart"]
+def test_the_surface_shows_the_same_picture_and_reports_each_view_after_its_swap(result):
+    share, mean = result["apart"]
     assert mean < 1.0
     assert share < 0.005  # edges may be smoothed differently
-    assert told["painted"] == list(range(FRAMES))
-    assert told["swaps"] >= FRAMES
-    assert told["locked"], "frames follow the swaps"
-    assert told["card"] == (not any(word in told["renderer"].lower() for word in SOFTWARE_RENDERERS))
+    assert result["painted"] == list(range(FRAMES))
+    assert result["swaps"] >= FRAMES
+    assert result["locked"], "frames follow the swaps"
+    assert result["card"] == (not any(word in result["renderer"].lower() for word in SOFTWARE_RENDERERS))
 
 
-def test_without_a_screen_there_is_no_card(qapp):
+def test_without_a_screen_no_graphics_card_is_found(qapp):
     assert opengl_renderer() is None
     assert not has_graphics_card()

@@ -1,4 +1,4 @@
-"""Pages to read: what they say, which keys go on, breaks that last, long texts, languages to choose from."""
+"""Pages to read: their texts, keys to continue, timed breaks, long texts, and the choice of language."""
 
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -27,28 +27,28 @@ def consent(*languages: str, language: str = "en") -> Any:
 @pytest.mark.parametrize("by_key", [False, True])
 def test_consent_can_be_declined_in_every_language(opening: Opening, by_key: bool) -> None:
     for language, said in LANGUAGES.items():
-        seen = opening(text_page("consent", language=language), FULL, language)
-        decline = seen.find(said.decline)
-        assert seen.page.rect().contains(decline.geometry())
-        assert not decline.geometry().intersects(seen.page.button.geometry())
+        participant = opening(text_page("consent", language=language), FULL, language)
+        decline = participant.find(said.decline)
+        assert participant.page.rect().contains(decline.geometry())
+        assert not decline.geometry().intersects(participant.page.button.geometry())
         if by_key:
             decline.setFocus()
-            seen.press(KEY.Key_Return)
+            participant.press(KEY.Key_Return)
         else:
-            seen.click(decline)
-        (end,) = seen.told
+            participant.click(decline)
+        (end,) = participant.told
         assert (type(end), end.status, end.reason) == (EndRequested, "withdrawn", "no consent")
     with pytest.raises(LookupError):
         opening(text_page(), FULL).find(ENGLISH.decline)
 
 
 def test_texts_languages_and_a_pause_work_by_touch(opening: Opening, finger: QPointingDevice) -> None:
-    seen = opening(consent(), FULL)
-    tap(finger, seen.find("Nederlands"))
-    tap(finger, seen.find("Go on"))
-    seen.show(PausePage(force_off=False))
-    tap(finger, seen.page.button)
-    assert seen.kinds == [LanguageChosen, Continue, ResumeRequested]
+    participant = opening(consent(), FULL)
+    tap(finger, participant.find("Nederlands"))
+    tap(finger, participant.find("Go on"))
+    participant.show(PausePage(force_off=False))
+    tap(finger, participant.page.button)
+    assert participant.kinds == [LanguageChosen, Continue, ResumeRequested]
 
 
 MARKUP = "<b>&amp;</b> <img src=x> & _"
@@ -70,25 +70,25 @@ def with_markup(page: Any) -> Any:
 
 @pytest.mark.parametrize("page", [choice(4), number(), text_page(), questionnaire(), form(*QUESTIONS)])
 def test_markup_in_texts_of_a_study_is_shown_as_it_is(opening: Opening, page: Any) -> None:
-    seen = opening(with_markup(page), FULL)
-    labels = [label for label in seen.page.findChildren(QLabel) if "img" in label.text()]
+    participant = opening(with_markup(page), FULL)
+    labels = [label for label in participant.page.findChildren(QLabel) if "img" in label.text()]
     for label in labels:
         plain = label.textFormat() is Qt.TextFormat.PlainText
         document = QTextDocument()
         (document.setPlainText if plain else document.setHtml)(label.text())
         assert MARKUP in document.toPlainText()
-    buttons = seen.page.findChildren(QAbstractButton)
+    buttons = participant.page.findChildren(QAbstractButton)
     assert [button.text() for button in buttons if not QKeySequence.mnemonic(button.text()).isEmpty()] == []
-    shown = [button.text().replace("&&", "&") for button in buttons if "img" in button.text()]
-    assert all(MARKUP in text for text in shown)
-    assert labels or shown or seen.page.accessibleName().count(MARKUP)
+    marked_texts = [button.text().replace("&&", "&") for button in buttons if "img" in button.text()]
+    assert all(MARKUP in text for text in marked_texts)
+    assert labels or marked_texts or participant.page.accessibleName().count(MARKUP)
 
 
 def test_languages_read_in_their_own_direction_and_enter_or_an_arrow_chooses_one(opening: Opening) -> None:
     languages = ("ar", "en", "nl")
     for key, language in ((KEY.Key_Right, "nl"), (KEY.Key_Left, "ar")):
-        seen = opening(consent(*languages), FULL)
-        buttons = {code: seen.find(words(code).name) for code in languages}
+        participant = opening(consent(*languages), FULL)
+        buttons = {code: participant.find(words(code).name) for code in languages}
         directions = {code: button.layoutDirection() for code, button in buttons.items()}
         left, right = Qt.LayoutDirection.LeftToRight, Qt.LayoutDirection.RightToLeft
         assert directions == {"ar": right, "en": left, "nl": left}
@@ -97,11 +97,11 @@ def test_languages_read_in_their_own_direction_and_enter_or_an_arrow_chooses_one
         assert focusable == ["en"]
         assert buttons["ar"].x() < buttons["en"].x() < buttons["nl"].x()
         buttons["en"].setFocus()
-        seen.press(key)
-        assert seen.kinds == [LanguageChosen]
-        assert seen.told[0].language == language
-    seen = opening(consent(*languages), FULL)
-    seen.find(words("nl").name).setFocus()
-    seen.press(KEY.Key_Return)
-    assert seen.kinds == [LanguageChosen]
-    assert seen.told[0].language == "nl"
+        participant.press(key)
+        assert participant.kinds == [LanguageChosen]
+        assert participant.told[0].language == language
+    participant = opening(consent(*languages), FULL)
+    participant.find(words("nl").name).setFocus()
+    participant.press(KEY.Key_Return)
+    assert participant.kinds == [LanguageChosen]
+    assert participant.told[0].language == "nl"

@@ -27,7 +27,7 @@ from study_app.session.pages import (
 from study_app.session.tasks import TankView
 from study_app.video.frames import VideoFrame
 from tests import golden
-from tests.gui.drawn import shown
+from tests.gui.drawn import grabbed_pixels
 from tests.gui.participant.driver import KEY, Participant
 from tests.gui.small import (
     DUTCH_LABELS,
@@ -50,7 +50,7 @@ TILES = 8
 FULL, SMALL, LARGE, NARROW = (1366, 768), (1024, 640), (1920, 1080), (683, 384)
 LONG = tuple(f"Sentence {number} is about the study. " * 20 for number in range(1, 5))
 PAIR = Progress(part=1, parts=1, label="Pair 57", index=57, of=220, at_most=True)
-ORDINALS = tuple((one, one.title()) for one in ("first", "second", "third", "fourth"))
+ORDINALS = tuple((ordinal, ordinal.title()) for ordinal in ("first", "second", "third", "fourth"))
 ENTER, SPACE, TAB, LEFT, RIGHT, UP, DOWN, HOME, END = (
     getattr(KEY, f"Key_{name}") for name in ("Return", "Space", "Tab", "Left", "Right", "Up", "Down", "Home", "End")
 )
@@ -58,7 +58,7 @@ ENTER, SPACE, TAB, LEFT, RIGHT, UP, DOWN, HOME, END = (
 
 @dataclass(frozen=True)
 class Click:
-    """A click on what has a name, in a question."""
+    """A click on a named button, optionally within a question."""
 
     name: str
     question: int | None = None
@@ -66,13 +66,13 @@ class Click:
 
 @dataclass(frozen=True)
 class Wait:
-    """Seconds of the session's clock that pass, until the window shows it."""
+    """A wait for seconds of the session's clock."""
 
     by_s: float
 
 
 class Case:
-    """A window, and what is done in it: pages and views are shown, keys pressed, texts typed, names clicked."""
+    """A window and its steps: pages and views to show, keys to press, texts to type, names to click."""
 
     def __init__(self, *steps: Any, size: Any = FULL, said: str = "en", **named: Any) -> None:
         self.steps, self.size, self.said, self.named = steps, size, said, named
@@ -294,7 +294,7 @@ def plain(value: Any) -> str:
         case QPointF():
             return f"{value.x():.1f},{value.y():.1f}"
         case QRectF():
-            return " ".join(f"{one:.0f}" for one in value.getRect())
+            return " ".join(f"{coordinate:.0f}" for coordinate in value.getRect())
         case tuple():
             return f"({' '.join(map(plain, value))})"
     return str(value)
@@ -302,39 +302,39 @@ def plain(value: Any) -> str:
 
 def picture(widget: QWidget) -> Iterator[str]:
     """Yield the mean of each colour in the tiles of a widget's picture, in steps of 16 of 255."""
-    image = shown(widget)
+    image = grabbed_pixels(widget)
     height, width = (length // TILES * TILES for length in image.shape[:2])
     tiles = image[:height, :width].reshape(TILES, height // TILES, TILES, width // TILES, 3)
     for number, row in enumerate(np.round(tiles.astype(float).mean((1, 3)) / 16).astype(int)):
         yield f"tiles {number}: {' '.join(''.join(f'{part:x}' for part in tile) for tile in row)}"
 
 
-def lines(seen: Participant) -> Iterator[str]:
-    """Yield what a window tells, and the places of a tank's things."""
-    focus = seen.focus
+def lines(participant: Participant) -> Iterator[str]:
+    """Yield the spoken lines of a window, and the positions of the things in its tank."""
+    focus = participant.focus
     yield f"keyboard at {getattr(focus, 'text', focus.accessibleName)()!r}"
-    yield from spoken(seen.window)
-    if (tank := seen.window.tank) is not None:
+    yield from spoken(participant.window)
+    if (tank := participant.window.tank) is not None:
         yield from (f"thing {name}: {plain(thing.state)} @{plain(thing.place)}" for name, thing in tank.parts.items())
 
 
-def act(seen: Participant, step: Any) -> None:
+def act(participant: Participant, step: Any) -> None:
     match step:
         case KEY():
-            seen.press(step)
+            participant.press(step)
         case str():
-            seen.type(step)
+            participant.type(step)
         case Click():
-            seen.click(step.name, step.question)
+            participant.click(step.name, step.question)
         case TankView():
-            seen.window.show_view(step)
+            participant.window.show_view(step)
         case Wait():
-            seen.clock.now_s += step.by_s
-            for timer in seen.page.findChildren(QTimer):
+            participant.clock.now_s += step.by_s
+            for timer in participant.page.findChildren(QTimer):
                 timer.timeout.emit()
         case _:
-            seen.show(step)
-    seen.settle()
+            participant.show(step)
+    participant.settle()
 
 
 def named(step: Any) -> str:
@@ -348,30 +348,30 @@ def named(step: Any) -> str:
     return f"show {type(step).__name__}"
 
 
-def transcript(seen: Participant, case: Case) -> Iterator[str]:
-    """Yield what each step tells the session and changes, and at last the picture of a tank."""
-    seen.clock.step_s = 0.0
+def transcript(participant: Participant, case: Case) -> Iterator[str]:
+    """Yield the events and changed lines of each step, and finally the picture of the tank."""
+    participant.clock.step_s = 0.0
     before: list[str] = []
     for step in case.steps:
-        seen.events.clear()
-        act(seen, step)
+        participant.events.clear()
+        act(participant, step)
         yield f"-- {named(step)}"
-        yield from (f"told {event}" for event in seen.events)
-        after = list(lines(seen))
+        yield from (f"told {event}" for event in participant.events)
+        after = list(lines(participant))
         yield from comes_and_goes(before, after)
         before = after
-    if seen.window.tank is not None:
-        yield from picture(seen.window.tank)
+    if participant.window.tank is not None:
+        yield from picture(participant.window.tank)
 
 
-@pytest.mark.parametrize("group", ["tanks", *(pytest.param(one, marks=pytest.mark.slow) for one in list(GROUPS)[:2])])
-def test_what_pages_show_and_tell(opening: Callable[..., Participant], pytestconfig: pytest.Config, group: str) -> None:
-    found = []
+@pytest.mark.parametrize("group", ["tanks", *(pytest.param(name, marks=pytest.mark.slow) for name in list(GROUPS)[:2])])
+def test_transcripts_of_pages(opening: Callable[..., Participant], pytestconfig: pytest.Config, group: str) -> None:
+    transcripts = []
     for name, case in GROUPS[group].items():
-        seen = opening(None, case.size, case.said, **case.named)
-        found += [f"== {name}", *transcript(seen, case)]
-        seen.close()
+        participant = opening(None, case.size, case.said, **case.named)
+        transcripts += [f"== {name}", *transcript(participant, case)]
+        participant.close()
     if group == "tanks":
-        golden.compare(GOLDEN / "participant_tanks.txt", found, pytestconfig)
+        golden.compare(GOLDEN / "participant_tanks.txt", transcripts, pytestconfig)
     else:
-        compare(f"participant, {group}", found, pytestconfig)
+        compare(f"participant, {group}", transcripts, pytestconfig)

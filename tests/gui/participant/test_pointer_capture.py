@@ -1,4 +1,4 @@
-"""The pointer as the hand, on a virtual display: no motion is lost where it is put back into the middle."""
+"""The captured pointer on a virtual display: no motion is lost when it is moved back to the centre."""
 
 import pytest
 
@@ -45,6 +45,6 @@ print(json.dumps({{"moved": (places[-1] - places[0]) / capture.gain, "left": [le
 @needs_display
 @pytest.mark.xvfb
 def test_quick_motion_is_counted_whole_and_the_pointer_comes_back() -> None:
-    told = on_a_display(SCRIPT)
-    assert told["moved"] == pytest.approx(STEP_PX * STEPS, abs=2)
-    assert told["left"] == [0, 0]
+    result = on_a_display(SCRIPT)
+    assert result["moved"] == pytest.approx(STEP_PX * STEPS, abs=2)
+    assert result["left"] == [0, 0]

@@ -1,4 +1,4 @@
-"""The pointer as the device: held in the tank alone, and mapped to the workspace."""
+"""The pointer as the device: captured only in the tank, and mapped to the workspace."""
 
 from typing import Any
 
@@ -15,8 +15,8 @@ from tests.gui.participant.driver import Participant
 from tests.gui.small import questionnaire, task_page, text_page
 
 
-@pytest.mark.parametrize("device", ["opened", "captured"])
-def test_pointer_is_hidden_in_the_tank_alone_and_held_there_if_it_is_the_device(request: Any, device: str) -> None:
+@pytest.mark.parametrize("device", ["participant", "captured"])
+def test_the_pointer_is_hidden_only_in_the_tank_and_captured_if_it_is_the_device(request: Any, device: str) -> None:
     window = request.getfixturevalue(device)
     for page, in_tank in ((text_page(), False), (task_page(), True), (questionnaire(), False)):
         window.show(page)
@@ -48,7 +48,7 @@ def test_the_operators_window_lets_the_pointer_go_and_the_trial_goes_on(captured
 
 
 @pytest.mark.parametrize("page", [text_page(), questionnaire()], ids=lambda page: type(page).__name__)
-def test_a_window_that_is_active_again_holds_the_pointer_in_the_tank_alone(
+def test_a_reactivated_window_captures_the_pointer_only_in_the_tank(
     captured: Participant, qtbot: Any, page: Page
 ) -> None:
     captured.show(task_page())
@@ -103,9 +103,9 @@ class Hand:
 
 @pytest.fixture
 def hand(qtbot: Any) -> Any:
-    made = Hand(qtbot)
-    yield made
-    made.capture.release()
+    pointer_hand = Hand(qtbot)
+    yield pointer_hand
+    pointer_hand.capture.release()
 
 
 def test_motion_moves_the_hand_right_and_up_shift_and_wheel_are_depth(hand: Hand) -> None:

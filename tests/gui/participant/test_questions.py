@@ -59,14 +59,14 @@ def alone(index: int) -> QuestionnairePage:
 
 @dataclass(frozen=True)
 class Kind:
-    """A page with one question of a kind and two ways to answer it: by keys, and by what is pressed."""
+    """A page with one question of a kind, and two ways to answer it: keys, and pressed buttons."""
 
     page: QuestionnairePage
     keys: tuple[KEY | str, ...]
     value: Any
     pressed: tuple[str, ...] = ()
     then: Any = None
-    shown: str = ""
+    entry_text: str = ""
 
     @property
     def item(self) -> ItemView:
@@ -89,18 +89,18 @@ KINDS = {
 ALL = pytest.mark.parametrize("name", KINDS)
 
 
-def give(seen: Participant, keys: tuple[KEY | str, ...]) -> None:
+def press_keys(participant: Participant, keys: tuple[KEY | str, ...]) -> None:
     for key in keys:
         if isinstance(key, str):
-            seen.type(key)
+            participant.type(key)
         else:
-            seen.press(key)
+            participant.press(key)
 
 
-def entries(seen: Participant) -> list[str]:
-    """Return what is written in the fields of the page."""
-    lines = [one.text() for one in seen.page.findChildren(QLineEdit)]
-    return lines + [one.toPlainText() for one in seen.page.findChildren(QPlainTextEdit)]
+def entries(participant: Participant) -> list[str]:
+    """Return the texts in the fields of the page."""
+    lines = [entry.text() for entry in participant.page.findChildren(QLineEdit)]
+    return lines + [entry.toPlainText() for entry in participant.page.findChildren(QPlainTextEdit)]
 
 
 def test_every_widget_of_a_question_is_tested() -> None:
@@ -110,19 +110,19 @@ def test_every_widget_of_a_question_is_tested() -> None:
 @ALL
 def test_nothing_is_preset_and_keys_alone_answer_and_submit_once(opening: Opening, name: str) -> None:
     kind = KINDS[name]
-    seen = opening(kind.page, FULL)
-    assert [type(event) for event in seen.events] == [ItemShown]
-    assert (seen.events[0].item, seen.page.missing) == (kind.item.id, (1,))
-    assert seen.question(1).accessibleName() == f"1. {kind.item.text}"
-    assert description_of(seen.question(1)).endswith("no answer yet")
-    give(seen, kind.keys)
-    assert seen.answers[-1] == (kind.item.id, kind.value)
-    assert "no answer yet" not in description_of(seen.question(1))
+    participant = opening(kind.page, FULL)
+    assert [type(event) for event in participant.events] == [ItemShown]
+    assert (participant.events[0].item, participant.page.missing) == (kind.item.id, (1,))
+    assert participant.question(1).accessibleName() == f"1. {kind.item.text}"
+    assert description_of(participant.question(1)).endswith("no answer yet")
+    press_keys(participant, kind.keys)
+    assert participant.answers[-1] == (kind.item.id, kind.value)
+    assert "no answer yet" not in description_of(participant.question(1))
     for _ in range(3):
-        seen.press(KEY.Key_Return)
-    assert seen.kinds.count(Submitted) == 1
-    assert seen.kinds[-1] is Submitted
-    assert sum(isinstance(event, ItemShown) for event in seen.events) == 1
+        participant.press(KEY.Key_Return)
+    assert participant.kinds.count(Submitted) == 1
+    assert participant.kinds[-1] is Submitted
+    assert sum(isinstance(event, ItemShown) for event in participant.events) == 1
 
 
 @pytest.mark.parametrize(
@@ -138,21 +138,21 @@ def test_nothing_is_preset_and_keys_alone_answer_and_submit_once(opening: Openin
         ("de", "1'00", "Geben Sie eine Zahl ein."),
     ],
 )
-def test_a_number_that_is_not_one_is_asked_for_again(opening: Opening, language: str, typed: str, asks: str) -> None:
-    seen = opening(form(NumberView("size", 1, "Large?", True)), FULL, language)
-    seen.type(typed)
-    seen.press(KEY.Key_Return)
-    assert seen.answers == []
-    assert asks in seen.texts
-    assert Submitted not in seen.kinds
+def test_an_invalid_number_is_requested_again(opening: Opening, language: str, typed: str, asks: str) -> None:
+    participant = opening(form(NumberView("size", 1, "Large?", True)), FULL, language)
+    participant.type(typed)
+    participant.press(KEY.Key_Return)
+    assert participant.answers == []
+    assert asks in participant.texts
+    assert Submitted not in participant.kinds
 
 
-def test_a_number_is_asked_for_again_even_if_only_one_of_its_readings_is_permitted(opening: Opening) -> None:
-    seen = opening(form(NumberView("size", 1, "Large?", True, least=0.0, most=10.0)), FULL)
-    seen.type("2,500")
-    seen.press(KEY.Key_Return)
-    assert seen.answers == []
-    assert "“2,500” can be read as 2.5 or 2500. Enter 2.5 or 2500." in seen.texts
+def test_an_ambiguous_number_is_requested_again_even_if_one_reading_is_permitted(opening: Opening) -> None:
+    participant = opening(form(NumberView("size", 1, "Large?", True, least=0.0, most=10.0)), FULL)
+    participant.type("2,500")
+    participant.press(KEY.Key_Return)
+    assert participant.answers == []
+    assert "“2,500” can be read as 2.5 or 2500. Enter 2.5 or 2500." in participant.texts
 
 
 @pytest.mark.parametrize(
@@ -163,22 +163,22 @@ def test_a_number_is_asked_for_again_even_if_only_one_of_its_readings_is_permitt
     ],
 )  # fmt: skip
 def test_a_number_with_one_reading_is_taken(opening: Opening, language: str, typed: str, value: float) -> None:
-    seen = opening(form(NumberView("size", 1, "Large?", True)), FULL, language)
-    seen.type(typed)
-    seen.press(KEY.Key_Return)
-    assert seen.answers == [("size", value)]
+    participant = opening(form(NumberView("size", 1, "Large?", True)), FULL, language)
+    participant.type(typed)
+    participant.press(KEY.Key_Return)
+    assert participant.answers == [("size", value)]
 
 
 @pytest.mark.parametrize(("language", "sign"), [("en", "."), ("nl", ","), ("de", ","), ("fr", ","), ("ar", ".")])
 def test_numbers_are_shown_and_kept_with_the_languages_decimal_sign(opening: Opening, language: str, sign: str) -> None:
     page = form(NumberView("size", 1, "Large?", True, least=16.5, most=99.0))
-    seen = opening(page, FULL, language)
-    seen.type("3")
-    seen.press(KEY.Key_Return)
+    participant = opening(page, FULL, language)
+    participant.type("3")
+    participant.press(KEY.Key_Return)
     assert words(language).number_between.format(kind=words(language).any_number, least=f"16{sign}5", most="99") in (
-        seen.texts
+        participant.texts
     )
-    assert [key.text() for key in seen.page.findChildren(QPushButton) if key.text() in {".", ","}] == [sign]
+    assert [key.text() for key in participant.page.findChildren(QPushButton) if key.text() in {".", ","}] == [sign]
     back = opening(replace(page, chosen=(("size", 17.125),)), FULL, language)
     assert entries(back) == [f"17{sign}125"]
     back.page.button.setFocus()
@@ -192,148 +192,157 @@ def test_a_question_is_answered_by_one_hand_or_a_screen_reader(
     opening: Opening, finger: QPointingDevice, qtbot: Any, name: str, way: str
 ) -> None:
     kind = KINDS[name]
-    seen = opening(kind.page, FULL)
+    participant = opening(kind.page, FULL)
 
     def use(target: str) -> None:
         if way == "mouse":
-            seen.click(target)
+            participant.click(target)
         elif way == "touch":
-            tap(finger, seen.find(target))
+            tap(finger, participant.find(target))
         else:
-            action = told_of(seen.find(target)).actionInterface()
+            action = told_of(participant.find(target)).actionInterface()
             action.doAction(action.actionNames()[0])
-            qtbot.waitUntil(lambda: not seen.find(target).isDown())
+            qtbot.waitUntil(lambda: not participant.find(target).isDown())
 
-    for target in (*kind.pressed, seen.page.button.text()):
+    for target in (*kind.pressed, participant.page.button.text()):
         use(target)
-    assert seen.answers == [(kind.item.id, kind.then)]
-    assert seen.kinds[-1] is Submitted
+    assert participant.answers == [(kind.item.id, kind.then)]
+    assert participant.kinds[-1] is Submitted
 
 
 @pytest.mark.parametrize("way", ["mouse", "touch", "screen reader"])
 def test_the_end_of_a_line_is_its_greatest_number(opening: Opening, finger: QPointingDevice, way: str) -> None:
-    seen = opening(KINDS["slider"].page, FULL)
-    line = seen.page.findChild(QSlider)
+    participant = opening(KINDS["slider"].page, FULL)
+    line = participant.page.findChild(QSlider)
     end = QPoint(line.width() - 2, line.height() // 2)
-    QTest.wheelEvent(seen.window.windowHandle(), line.mapTo(seen.window, line.rect().center()), QPoint(0, 120))
-    assert seen.answers == [], "the wheel changes no answer"
+    QTest.wheelEvent(
+        participant.window.windowHandle(), line.mapTo(participant.window, line.rect().center()), QPoint(0, 120)
+    )
+    assert participant.answers == [], "the wheel changes no answer"
     if way == "mouse":
-        seen.click(line, place=end)
+        participant.click(line, place=end)
     elif way == "touch":
         tap(finger, line, end)
     else:
         told_of(line).valueInterface().setCurrentValue(line.maximum())
-    assert seen.answers == [("pleasant", 100)]
+    assert participant.answers == [("pleasant", 100)]
     assert "chosen: 100" in line.accessibleDescription()
 
 
 @ALL
-def test_an_answer_comes_back_after_a_pause_and_is_not_told_again(opening: Opening, name: str) -> None:
+def test_an_answer_is_restored_after_a_pause_without_another_event(opening: Opening, name: str) -> None:
     kind = KINDS[name]
-    given = opening(kind.page, FULL)
-    give(given, kind.keys)
-    seen = opening(replace(kind.page, chosen=((kind.item.id, kind.value),)), FULL)
-    assert seen.told == []
-    assert seen.page.missing == ()
-    for one in (given, seen):
-        one.page.button.setFocus()
-        one.settle()
-    assert description_of(seen.question(1)) == description_of(given.question(1))
-    if kind.shown:
-        assert kind.shown in entries(seen)
+    first_time = opening(kind.page, FULL)
+    press_keys(first_time, kind.keys)
+    again = opening(replace(kind.page, chosen=((kind.item.id, kind.value),)), FULL)
+    assert again.told == []
+    assert again.page.missing == ()
+    for participant in (first_time, again):
+        participant.page.button.setFocus()
+        participant.settle()
+    assert description_of(again.question(1)) == description_of(first_time.question(1))
+    if kind.entry_text:
+        assert kind.entry_text in entries(again)
     else:
-        assert seen.question(1).grab().toImage() == given.question(1).grab().toImage()
+        assert again.question(1).grab().toImage() == first_time.question(1).grab().toImage()
 
 
 @ALL
-def test_escape_pauses_and_takes_what_was_typed(opening: Opening, name: str) -> None:
+def test_escape_pauses_and_keeps_the_typed_answer(opening: Opening, name: str) -> None:
     kind = KINDS[name]
-    seen = opening(kind.page, FULL)
-    give(seen, tuple(key for key in kind.keys if isinstance(key, str)))
-    seen.press(KEY.Key_Escape)
-    assert seen.kinds[-1] is PauseRequested
-    assert len(seen.answers) == isinstance(kind.keys[0], str)
+    participant = opening(kind.page, FULL)
+    press_keys(participant, tuple(key for key in kind.keys if isinstance(key, str)))
+    participant.press(KEY.Key_Escape)
+    assert participant.kinds[-1] is PauseRequested
+    assert len(participant.answers) == isinstance(kind.keys[0], str)
 
 
-def test_an_answer_taken_back_is_no_answer_and_text_keeps_to_its_length(opening: Opening) -> None:
-    seen = opening(form(), FULL)
+def test_a_retracted_answer_does_not_count_and_text_is_limited_in_length(opening: Opening) -> None:
+    participant = opening(form(), FULL)
     for _ in range(2):
-        seen.click("A mouse")
-    seen.question(7).setFocus()
-    seen.type("x")
-    seen.question(7).finish()
-    seen.press(KEY.Key_Backspace)
-    seen.question(7).finish()
-    assert seen.kinds == [Chosen, Retracted] * 2
-    seen.page.findChild(QPlainTextEdit).setPlainText("a\u202eb\x07 " + "c" * 40)
-    seen.question(7).finish()
-    _, text = seen.answers[-1]
+        participant.click("A mouse")
+    participant.question(7).setFocus()
+    participant.type("x")
+    participant.question(7).finish()
+    participant.press(KEY.Key_Backspace)
+    participant.question(7).finish()
+    assert participant.kinds == [Chosen, Retracted] * 2
+    participant.page.findChild(QPlainTextEdit).setPlainText("a\u202eb\x07 " + "c" * 40)
+    participant.question(7).finish()
+    _, text = participant.answers[-1]
     assert len(text) <= 20
     assert "\x07" not in text
 
 
-def test_the_foot_says_what_is_missing_how_much_is_answered_and_which_keys_answer(opening: Opening) -> None:
-    seen, en = opening(form(), (1366, 2000)), words("en")
+def test_the_footer_states_missing_answers_progress_and_answer_keys(opening: Opening) -> None:
+    participant, en = opening(form(), (1366, 2000)), words("en")
 
-    def foot(message: str, done: int, of: int) -> str:
+    def foot(message: str, answered: int, of: int) -> str:
         kept = f"{message} {en.answers_kept} " if message else ""
-        return f"{kept}{en.answered.format(done=done, of=of)}"
+        return f"{kept}{en.answered.format(done=answered, of=of)}"
 
     def keys(answer_keys: str) -> str:
         return f"↑ ↓ {en.key_move}, {answer_keys} {en.key_answer}"
 
-    told = [(seen.page.foot.accessibleName(), seen.page.foot.accessibleDescription())]
+    states = [(participant.page.foot.accessibleName(), participant.page.foot.accessibleDescription())]
     for act in (("42", KEY.Key_Return), (KEY.Key_3,), ("7", KEY.Key_Return), (KEY.Key_1,)):
-        give(seen, act)
-        told.append((seen.page.foot.accessibleName(), seen.page.foot.accessibleDescription()))
-    assert told == [
-        (foot("", 0, 6), keys(seen.question(1).answer_keys)),
+        press_keys(participant, act)
+        states.append((participant.page.foot.accessibleName(), participant.page.foot.accessibleDescription()))
+    assert states == [
+        (foot("", 0, 6), keys(participant.question(1).answer_keys)),
         (foot("", 1, 6), keys("1–3")),
-        (foot("", 2, 7), keys(seen.question(3).answer_keys)),  # a new question
+        (foot("", 2, 7), keys(participant.question(3).answer_keys)),  # a new question
         (foot("", 3, 7), keys("1–3")),
         (foot("", 4, 7), keys("1–3")),
     ]
-    seen.click("Continue")
+    participant.click("Continue")
     message = en.questions_missing([5, 6])
-    assert seen.page.foot.accessibleName() == foot(message, 4, 7)
-    assert seen.page.button.accessibleDescription() == message
-    assert (seen.question(5).missing, seen.question(7).missing, seen.focus) == (True, False, seen.question(5))
-    seen.click("Left", 2)  # which hides the third question
-    assert (seen.page.foot.accessibleName(), seen.question(3).isHidden()) == (foot(message, 3, 6), True)
-    seen.click("Both", 2)
-    assert (seen.page.foot.accessibleName(), entries(seen)[1]) == (foot(en.questions_missing([5, 6]), 3, 7), "")
-    seen.click("A mouse", 4)
-    assert seen.page.foot.accessibleName() == foot(message, 2, 7)
-    assert (seen.question(4).is_answered, seen.question(4).value) == (False, None)
-    assert description_of(seen.question(4)).endswith("no answer yet")
+    assert participant.page.foot.accessibleName() == foot(message, 4, 7)
+    assert participant.page.button.accessibleDescription() == message
+    assert (participant.question(5).missing, participant.question(7).missing, participant.focus) == (
+        True,
+        False,
+        participant.question(5),
+    )
+    participant.click("Left", 2)  # which hides the third question
+    assert (participant.page.foot.accessibleName(), participant.question(3).isHidden()) == (foot(message, 3, 6), True)
+    participant.click("Both", 2)
+    assert (participant.page.foot.accessibleName(), entries(participant)[1]) == (
+        foot(en.questions_missing([5, 6]), 3, 7),
+        "",
+    )
+    participant.click("A mouse", 4)
+    assert participant.page.foot.accessibleName() == foot(message, 2, 7)
+    assert (participant.question(4).is_answered, participant.question(4).value) == (False, None)
+    assert description_of(participant.question(4)).endswith("no answer yet")
 
 
 def test_a_key_leads_to_the_next_question_and_a_click_stays(opening: Opening) -> None:
     page = form(*(replace(QUESTIONS[index], number=at) for at, index in enumerate((1, 4), 1)))  # type: ignore[arg-type]
-    seen, pointed = opening(page, FULL), list[int]()
-    first, second = seen.question(1), seen.question(2)
+    participant, pointed = opening(page, FULL), list[int]()
+    first, second = participant.question(1), participant.question(2)
     first.pointed_at.connect(pointed.append)
-    seen.click("Left", 1)
-    assert (seen.focus, first.value) == (first, "left")
-    seen.press(KEY.Key_Right, KEY.Key_Right, KEY.Key_Right)
+    participant.click("Left", 1)
+    assert (participant.focus, first.value) == (first, "left")
+    participant.press(KEY.Key_Right, KEY.Key_Right, KEY.Key_Right)
     assert (pointed, first.value) == ([1, 2], "left")
-    seen.press(KEY.Key_Space)
-    assert (seen.focus, first.value, first.pointed, pointed[-1]) == (second, "both", -1, -1)
-    seen.press(KEY.Key_Left)
+    participant.press(KEY.Key_Space)
+    assert (participant.focus, first.value, first.pointed, pointed[-1]) == (second, "both", -1, -1)
+    participant.press(KEY.Key_Left)
     assert second.pointed == 5, "from the end"
-    seen.press(KEY.Key_Up, KEY.Key_2)
-    assert (seen.focus, first.value) == (second, "right")
-    seen.press(KEY.Key_6)  # five points
+    participant.press(KEY.Key_Up, KEY.Key_2)
+    assert (participant.focus, first.value) == (second, "right")
+    participant.press(KEY.Key_6)  # five points
     assert not second.is_answered
-    seen.press(KEY.Key_5)
-    assert (second.value, seen.focus) == (5, seen.page.button)
+    participant.press(KEY.Key_5)
+    assert (second.value, participant.focus) == (5, participant.page.button)
 
 
-def test_the_mouse_points_at_an_option_until_it_leaves_and_a_finger_at_none(
+def test_the_mouse_highlights_an_option_until_it_leaves_but_a_finger_does_not(
     opening: Opening, finger: QPointingDevice
 ) -> None:
-    seen, pointed = opening(alone(1), FULL), list[int]()
-    question = seen.question(1)
+    participant, pointed = opening(alone(1), FULL), list[int]()
+    question = participant.question(1)
     question.pointed_at.connect(pointed.append)
     for place in (1, 0):
         QApplication.sendEvent(question.options[place], QEnterEvent(QPoint(1, 1), QPoint(1, 1), QPoint(1, 1)))
@@ -343,33 +352,33 @@ def test_the_mouse_points_at_an_option_until_it_leaves_and_a_finger_at_none(
     assert pointed == [1, -1, 0, -1]
     question.point_at(2)
     tap(finger, question.options[2])
-    assert (question.pointed, seen.answers) == (-1, [("hand", "both")])
+    assert (question.pointed, participant.answers) == (-1, [("hand", "both")])
 
 
 def test_enter_begins_a_line_where_there_are_several_and_goes_on_with_ctrl(opening: Opening, qtbot: Any) -> None:
     page = form(*(TextView(f"text{n}", n, "What else?", False, lines=lines) for n, lines in ((1, 3), (2, 1))))
-    seen = opening(page, FULL)
-    give(seen, ("One", KEY.Key_Return, "two"))
-    assert (entries(seen), seen.focus) == (["One\ntwo", ""], seen.question(1).entry)
-    qtbot.keyClick(seen.focus, KEY.Key_Return, Qt.KeyboardModifier.ControlModifier)
-    assert (seen.answers, seen.focus) == ([("text1", "One\ntwo")], seen.question(2).entry)
-    give(seen, ("three", KEY.Key_Return))
-    assert (seen.answers[1:], seen.focus) == ([("text2", "three")], seen.page.button)
+    participant = opening(page, FULL)
+    press_keys(participant, ("One", KEY.Key_Return, "two"))
+    assert (entries(participant), participant.focus) == (["One\ntwo", ""], participant.question(1).entry)
+    qtbot.keyClick(participant.focus, KEY.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert (participant.answers, participant.focus) == ([("text1", "One\ntwo")], participant.question(2).entry)
+    press_keys(participant, ("three", KEY.Key_Return))
+    assert (participant.answers[1:], participant.focus) == ([("text2", "three")], participant.page.button)
 
 
-def test_a_line_begins_in_its_middle_and_says_that_it_has_no_answer(opening: Opening) -> None:
-    seen = opening(KINDS["slider"].page, FULL)
-    texts = [label.text() for label in seen.question(1).findChildren(QLabel)]
+def test_a_slider_begins_in_the_middle_and_states_that_it_has_no_answer(opening: Opening) -> None:
+    participant = opening(KINDS["slider"].page, FULL)
+    texts = [label.text() for label in participant.question(1).findChildren(QLabel)]
     assert {"Unpleasant", "no answer yet", "Pleasant"} <= {*texts}
     for key, value in (("Right", 50), ("Right", 55), ("Left", 50), ("PageUp", 100), ("PageDown", 50), ("Home", 0)):
-        seen.press(getattr(KEY, f"Key_{key}"))
-        assert seen.answers[-1] == ("pleasant", value), key
-    assert "no answer yet" not in seen.texts
+        participant.press(getattr(KEY, f"Key_{key}"))
+        assert participant.answers[-1] == ("pleasant", value), key
+    assert "no answer yet" not in participant.texts
 
 
 def test_the_place_where_the_handle_is_let_go_is_the_answer(opening: Opening) -> None:
-    seen = opening(KINDS["slider"].page, FULL)
-    line = seen.page.findChild(QSlider)
+    participant = opening(KINDS["slider"].page, FULL)
+    line = participant.page.findChild(QSlider)
     middle = line.height() // 2
     left, half, right = (QPoint(x, middle) for x in (0, line.width() // 2, line.width() - 1))
     for button, places, answers in (
@@ -377,22 +386,22 @@ def test_the_place_where_the_handle_is_let_go_is_the_answer(opening: Opening) ->
         (Qt.MouseButton.LeftButton, (half, right, right), [100]),
         (Qt.MouseButton.LeftButton, (right, half, left), [100, 0]),
     ):
-        before = len(seen.answers)
+        before = len(participant.answers)
         QTest.mousePress(line, button, pos=places[0])
         QTest.mouseMove(line, places[1])
         if button is Qt.MouseButton.LeftButton:
             assert line.value() == {half: 10, right: 20}[places[1]]
-        assert len(seen.answers) == before
+        assert len(participant.answers) == before
         QTest.mouseRelease(line, button, pos=places[2])
-        assert [value for _, value in seen.answers] == answers
+        assert [value for _, value in participant.answers] == answers
 
 
 @pytest.mark.parametrize("text_scale", [1.0, 2.0])
-def test_what_is_hit_grows_with_the_text_but_never_shrinks(opening: Opening, text_scale: float) -> None:
-    seen = opening(KINDS["slider"].page, FULL, text_scale=text_scale)
-    scale = seen.question(1).scale
+def test_targets_grow_with_the_text_but_never_shrink(opening: Opening, text_scale: float) -> None:
+    participant = opening(KINDS["slider"].page, FULL, text_scale=text_scale)
+    scale = participant.question(1).scale
     assert (scale > 1.3) is (text_scale == 2.0)
-    assert seen.page.findChild(QSlider).height() == round(LEAST_TARGET * max(1.0, scale))
+    assert participant.page.findChild(QSlider).height() == round(LEAST_TARGET * max(1.0, scale))
 
 
 TLX = tuple(
@@ -407,8 +416,8 @@ ELEVEN = (RatingView("r", 1, "How rough?", True, labels=tuple("abcdefghijk"), ca
 TWELVE = (ChoiceView("c", 1, "Which?", True, options=tuple((f"o{n}", f"The option number {n}") for n in range(12))),)
 
 
-def place_of(seen: Participant, widget: QWidget) -> Any:
-    return widget.rect().translated(widget.mapTo(seen.page, QPoint(0, 0)))
+def place_of(participant: Participant, widget: QWidget) -> Any:
+    return widget.rect().translated(widget.mapTo(participant.page, QPoint(0, 0)))
 
 
 @pytest.mark.variants(8)
@@ -420,17 +429,17 @@ def place_of(seen: Participant, widget: QWidget) -> Any:
 def test_every_part_fits_and_can_be_hit(
     opening: Opening, items: tuple[ItemView, ...], size: tuple[int, int], language: str, text_scale: float
 ) -> None:
-    seen = opening(form(*items), size, language, text_scale)
-    seen.page.submit()  # the notes take room as well
-    shown: list[str] = []
-    for part in seen.page.parts:
-        seen.page.go_to(part[0])
-        seen.settle()
-        shown += [field.view.id for field in seen.page.part]
+    participant = opening(form(*items), size, language, text_scale)
+    participant.page.submit()  # the notes take room as well
+    field_ids: list[str] = []
+    for part in participant.page.parts:
+        participant.page.go_to(part[0])
+        participant.settle()
+        field_ids += [field.view.id for field in participant.page.part]
         for field in part:
             assert field.isVisible()
-            assert seen.page.rect().contains(field.geometry())
-            assert field.geometry().bottom() <= seen.page.foot.geometry().top()
+            assert participant.page.rect().contains(field.geometry())
+            assert field.geometry().bottom() <= participant.page.foot.geometry().top()
             assert field.statement.height() >= field.statement.heightForWidth(field.statement.width()) - 1
             for label in field.findChildren(QLabel):
                 if label.isVisible() and label.wordWrap():
@@ -438,11 +447,11 @@ def test_every_part_fits_and_can_be_hit(
             for kind in (QAbstractButton, QLineEdit, QPlainTextEdit, QSlider):
                 for hit in field.findChildren(kind):
                     assert min(hit.width(), hit.height()) >= LEAST_TARGET, (type(hit), hit.size())
-                    assert seen.page.rect().contains(place_of(seen, hit))
-        for one, other in pairwise(seen.page.part):
-            assert one.geometry().bottom() < other.geometry().top() + 1
-    assert shown == [field.view.id for field in seen.page.asked]
-    assert items is not TLX or size != FULL or text_scale > 1 or len(seen.page.parts) == 1
+                    assert participant.page.rect().contains(place_of(participant, hit))
+        for upper, lower in pairwise(participant.page.part):
+            assert upper.geometry().bottom() < lower.geometry().top() + 1
+    assert field_ids == [field.view.id for field in participant.page.asked]
+    assert items is not TLX or size != FULL or text_scale > 1 or len(participant.page.parts) == 1
 
 
 GIVEN: dict[str, tuple[KEY | str, ...]] = {
@@ -455,14 +464,14 @@ GIVEN: dict[str, tuple[KEY | str, ...]] = {
 
 
 class Session:
-    """The state machine and the window, each telling the other."""
+    """The state machine connected with the window."""
 
-    def __init__(self, study: Any, seen: Participant) -> None:
-        self.seen = seen
+    def __init__(self, study: Any, participant: Participant) -> None:
+        self.participant = participant
         self.answered: list[Any] = []
         key = draw_key(study, stream(1, "key").random)
         self.state = initial_state(study, build_schedule(study, "P001", 1), key, "en")
-        seen.window.event.connect(self.post)
+        participant.window.event.connect(self.post)
 
     def post(self, event: Any) -> None:
         self.state, commands = advance(self.state, event)
@@ -470,12 +479,12 @@ class Session:
             if isinstance(command, Write) and isinstance(command.line, FormAnswered | Responses):
                 self.answered.append(command.line)
             if isinstance(command, ShowPage) and self.state.phase is not Phase.TASK:
-                self.seen.window.show_page(command.page)
+                self.participant.window.show_page(command.page)
 
 
-def test_a_session_with_a_question_of_every_kind_is_done_by_keys_alone(opening: Opening, tmp_path: Any) -> None:
-    seen = opening(size=FULL)
-    session = Session(load(mixed_file(tmp_path)), seen)
+def test_a_session_with_every_kind_of_question_is_completed_by_keys_alone(opening: Opening, tmp_path: Any) -> None:
+    participant = opening(size=FULL)
+    session = Session(load(mixed_file(tmp_path)), participant)
     session.post(Begin(0.0))
     for _ in range(200):
         QApplication.processEvents()
@@ -484,14 +493,14 @@ def test_a_session_with_a_question_of_every_kind_is_done_by_keys_alone(opening: 
         if session.state.phase is Phase.TASK:
             session.post(TaskDone(1.0, "complete", {}))
             continue
-        focused = seen.focus
-        field = next((one for one in seen.page.part if one is focused or one.isAncestorOf(focused)), None)
+        focused = participant.focus
+        field = next((part for part in participant.page.part if part is focused or part.isAncestorOf(focused)), None)
         if field is None:
-            seen.press(KEY.Key_Return)
+            participant.press(KEY.Key_Return)
             continue
-        give(seen, GIVEN[field.view.widget])
-        if seen.focus is focused:
-            seen.press(KEY.Key_Down)
+        press_keys(participant, GIVEN[field.view.widget])
+        if participant.focus is focused:
+            participant.press(KEY.Key_Down)
     assert session.state.phase is Phase.COMPLETE
     rows = [row for line in session.answered for row in line.items]
     assert len(rows) == 3 + 2 * 3 + 6 + 10 + 1

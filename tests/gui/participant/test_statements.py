@@ -24,97 +24,103 @@ GIVEN = (6, 5, 4, None, 7, 2, 1, 4, 7)
 
 
 @pytest.fixture
-def seen(opening: Opening) -> Participant:
+def participant(opening: Opening) -> Participant:
     return opening(questionnaire(cannot_judge="Cannot judge"), FULL)
 
 
-def values(seen: Participant) -> list[Any]:
-    return [value for _, value in seen.answers]
+def values(participant: Participant) -> list[Any]:
+    return [value for _, value in participant.answers]
 
 
-def visible(seen: Participant) -> list[int]:
-    return [row.view.number for row in seen.page.fields if row.isVisible()]
+def visible(participant: Participant) -> list[int]:
+    return [row.view.number for row in participant.page.fields if row.isVisible()]
 
 
-def cell(seen: Participant, row: int, value: int | None) -> Any:
+def cell(participant: Participant, row: int, value: int | None) -> Any:
     """Return the cell of a point, or of "cannot judge", in a row from 1."""
-    return seen.find("Cannot judge" if value is None else f"{value} {LABELS[value - 1]}", row)
+    return participant.find("Cannot judge" if value is None else f"{value} {LABELS[value - 1]}", row)
 
 
 @pytest.mark.parametrize("way", ["keys", "mouse", "touch"])
-def test_all_is_answered_in_one_way_alone_and_told_in_order(
-    seen: Participant, finger: QPointingDevice, way: str
+def test_all_statements_are_answered_in_each_way_with_events_in_order(
+    participant: Participant, finger: QPointingDevice, way: str
 ) -> None:
     for row, value in enumerate(GIVEN, 1):
         if way == "mouse":
-            seen.click(cell(seen, row, value))
+            participant.click(cell(participant, row, value))
         elif way == "touch":
-            tap(finger, cell(seen, row, value))
+            tap(finger, cell(participant, row, value))
         elif value is None:
-            seen.press(*[KEY.Key_Right] * 8, KEY.Key_Space)
+            participant.press(*[KEY.Key_Right] * 8, KEY.Key_Space)
         else:
-            seen.press(KEY(KEY.Key_0 + value))
-    assert way == "touch" or seen.focus is (seen.page.button if way == "keys" else seen.question(9))
+            participant.press(KEY(KEY.Key_0 + value))
+    assert way == "touch" or participant.focus is (
+        participant.page.button if way == "keys" else participant.question(9)
+    )
     if way == "touch":
-        tap(finger, cell(seen, 1, 2), QPoint(2, 2))  # a change, at the corner of its cell
-        tap(finger, seen.page.button)
+        tap(finger, cell(participant, 1, 2), QPoint(2, 2))  # a change, at the corner of its cell
+        tap(finger, participant.page.button)
     else:
-        seen.press(KEY.Key_Return, KEY.Key_Return)
+        participant.press(KEY.Key_Return, KEY.Key_Return)
     changes = 1 if way == "touch" else 0
-    kinds = [type(event) for event in seen.events]
+    kinds = [type(event) for event in participant.events]
     assert kinds == [ItemShown] * 9 + [Chosen] * (9 + changes) + [Submitted]
-    assert [event.item for event in seen.events[:9]] == [f"item{n}" for n in range(1, 10)]
-    assert values(seen) == [*GIVEN, *[2] * changes]
-    times = [event.at_s for event in seen.events]
+    assert [event.item for event in participant.events[:9]] == [f"item{n}" for n in range(1, 10)]
+    assert values(participant) == [*GIVEN, *[2] * changes]
+    times = [event.at_s for event in participant.events]
     assert times == sorted(times)
 
 
 def test_the_column_that_is_pointed_at_is_labelled_beside_ends_and_middle(
-    seen: Participant, opening: Opening, finger: QPointingDevice
+    participant: Participant, opening: Opening, finger: QPointingDevice
 ) -> None:
     fixed = (LABELS[0], LABELS[3], LABELS[6])
-    assert set(fixed) <= set(seen.page.heading)
-    before = seen.page.heading
-    QTest.mouseMove(cell(seen, 3, 2))
-    seen.click(cell(seen, 3, 2))
-    assert set(seen.page.heading) == set(before) | {LABELS[1]}
-    QTest.mouseMove(seen.page, QPoint(5, 5))
+    assert set(fixed) <= set(participant.page.heading)
+    before = participant.page.heading
+    QTest.mouseMove(cell(participant, 3, 2))
+    participant.click(cell(participant, 3, 2))
+    assert set(participant.page.heading) == set(before) | {LABELS[1]}
+    QTest.mouseMove(participant.page, QPoint(5, 5))
     QApplication.processEvents()
-    assert seen.page.heading == before
-    tap(finger, cell(seen, 3, 2))
-    assert seen.page.heading == before, "a finger that is lifted points at nothing"
-    seen = opening(questionnaire(labels=DUTCH_LABELS), (860, 640))  # which have no room beside each other
-    seen.press(KEY.Key_Right, KEY.Key_Right)
-    assert DUTCH_LABELS[1] in seen.page.heading
-    assert DUTCH_LABELS[0] not in seen.page.heading
+    assert participant.page.heading == before
+    tap(finger, cell(participant, 3, 2))
+    assert participant.page.heading == before, "a finger that is lifted points at nothing"
+    participant = opening(questionnaire(labels=DUTCH_LABELS), (860, 640))  # which have no room beside each other
+    participant.press(KEY.Key_Right, KEY.Key_Right)
+    assert DUTCH_LABELS[1] in participant.page.heading
+    assert DUTCH_LABELS[0] not in participant.page.heading
 
 
 def test_a_small_window_shows_five_a_page_and_asks_page_by_page(opening: Opening, finger: QPointingDevice) -> None:
-    seen = opening(questionnaire(), SMALL)
-    assert visible(seen) == [1, 2, 3, 4, 5]
-    assert [event.item for event in seen.events] == [f"item{n}" for n in visible(seen)]
-    seen.press(*[KEY.Key_3] * 4, KEY.Key_Return)
-    assert seen.page.message == "One statement still needs an answer: 5."
-    seen.press(KEY.Key_3, KEY.Key_Return)
-    assert visible(seen) == [6, 7, 8, 9]
-    assert seen.focus is seen.question(6)
-    seen.settle()
-    seen.press(KEY.Key_Up)
-    assert visible(seen) == [1, 2, 3, 4, 5]
-    seen.settle()
-    tap(finger, seen.find("6–9"))
-    seen.settle()
-    tap(finger, seen.page.button)
-    assert seen.page.message.endswith("6, 7, 8 and 9.")
-    seen.press(*[KEY.Key_2] * 4, KEY.Key_Return)
-    assert seen.kinds == [Chosen] * 9 + [Submitted]
-    assert {event.item for event in seen.events if isinstance(event, ItemShown)} == {f"item{n}" for n in range(1, 10)}
-    seen.window.resize(*FULL)
-    assert visible(seen) == [*range(1, 10)]
-    assert seen.page.tabs == []
+    participant = opening(questionnaire(), SMALL)
+    assert visible(participant) == [1, 2, 3, 4, 5]
+    assert [event.item for event in participant.events] == [f"item{n}" for n in visible(participant)]
+    participant.press(*[KEY.Key_3] * 4, KEY.Key_Return)
+    assert participant.page.message == "One statement still needs an answer: 5."
+    participant.press(KEY.Key_3, KEY.Key_Return)
+    assert visible(participant) == [6, 7, 8, 9]
+    assert participant.focus is participant.question(6)
+    participant.settle()
+    participant.press(KEY.Key_Up)
+    assert visible(participant) == [1, 2, 3, 4, 5]
+    participant.settle()
+    tap(finger, participant.find("6–9"))
+    participant.settle()
+    tap(finger, participant.page.button)
+    assert participant.page.message.endswith("6, 7, 8 and 9.")
+    participant.press(*[KEY.Key_2] * 4, KEY.Key_Return)
+    assert participant.kinds == [Chosen] * 9 + [Submitted]
+    assert {event.item for event in participant.events if isinstance(event, ItemShown)} == {
+        f"item{n}" for n in range(1, 10)
+    }
+    participant.window.resize(*FULL)
+    assert visible(participant) == [*range(1, 10)]
+    assert participant.page.tabs == []
 
 
-def test_what_is_pointed_at_chosen_and_missing_is_announced(seen: Participant, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pointed_chosen_and_missing_answers_are_announced(
+    participant: Participant, monkeypatch: pytest.MonkeyPatch
+) -> None:
     said: list[str] = []
     checked: list[tuple[str, bool]] = []
 
@@ -126,17 +132,17 @@ def test_what_is_pointed_at_chosen_and_missing_is_announced(seen: Participant, m
 
     monkeypatch.setattr(QAccessible, "isActive", lambda: True)
     monkeypatch.setattr(QAccessible, "updateAccessibility", update)
-    seen.press(KEY.Key_Right, KEY.Key_Space, KEY.Key_4)
+    participant.press(KEY.Key_Right, KEY.Key_Space, KEY.Key_4)
     assert said == ["1 Completely disagree", "chosen: 1 Completely disagree", "chosen: 4 Neutral"]
     assert ("4 Neutral", True) in checked
-    seen.press(KEY.Key_Return)
+    participant.press(KEY.Key_Return)
     assert said[-1] == "Seven statements still need an answer: 3, 4, 5, 6, 7, 8 and 9."
 
 
-def test_what_is_announced_reaches_qt(seen: Participant) -> None:
+def test_announcements_reach_qt(participant: Participant) -> None:
     was = QAccessible.isActive()
     QAccessible.setActive(True)
-    seen.press(KEY.Key_Right, KEY.Key_Space)  # an announcement that Qt refuses would be a warning, and fail
+    participant.press(KEY.Key_Right, KEY.Key_Space)  # an announcement that Qt refuses would be a warning, and fail
     QAccessible.setActive(was)
 
 
@@ -144,8 +150,8 @@ def test_all_is_mirrored_but_the_order_of_the_scale_and_the_keys_that_go_along_i
     page = questionnaire(cannot_judge="Cannot judge")
     here, there = opening(page, FULL), opening(page, FULL, "ar")
 
-    def lefts(seen: Participant) -> list[int]:
-        return [one.mapTo(seen.page, QPoint()).x() for one in seen.question(1).options]
+    def lefts(participant: Participant) -> list[int]:
+        return [option.mapTo(participant.page, QPoint()).x() for option in participant.question(1).options]
 
     assert lefts(here) == sorted(lefts(here))
     assert lefts(there)[:7] == sorted(lefts(there)[:7])
@@ -169,10 +175,10 @@ def test_only_a_page_that_asks_it_has_a_column_for_cannot_judge(
 def test_numbers_and_statements_grow_with_the_text_of_the_page(opening: Opening) -> None:
     heights, scales = list[list[float]](), list[float]()
     for text_scale in (1.0, 2.0):
-        seen = opening(questionnaire(("It is thick.", "It is warm.")), FULL, text_scale=text_scale)
-        ink = {drawn.text: drawn.ink.height() for drawn in drawn_by(seen.window)}
+        participant = opening(questionnaire(("It is thick.", "It is warm.")), FULL, text_scale=text_scale)
+        ink = {drawn.text: drawn.ink.height() for drawn in drawn_by(participant.window)}
         heights.append([ink[text] for text in ("1", "It is thick.", "2", "It is warm.")])
-        scales.append(seen.question(2).sizes.text)
+        scales.append(participant.question(2).sizes.text)
     assert scales[1] > 1.3 * scales[0]
     assert heights[1] == pytest.approx([scales[1] / scales[0] * height for height in heights[0]], rel=0.08)
 
@@ -185,25 +191,25 @@ def test_statements_are_divided_evenly_and_one_to_a_page_where_no_more_fit(
     opening: Opening, size: tuple[int, int], words: int, text_scale: float, parts: list[int]
 ) -> None:
     statements = tuple(f"Statement {number}: {'thick ' * words}" for number in range(1, 8))
-    seen = opening(questionnaire(statements), size, text_scale=text_scale)
-    assert [len(part) for part in seen.page.parts] == parts
-    assert [field.view.number for part in seen.page.parts for field in part] == list(range(1, 8))
+    participant = opening(questionnaire(statements), size, text_scale=text_scale)
+    assert [len(part) for part in participant.page.parts] == parts
+    assert [field.view.number for part in participant.page.parts for field in part] == list(range(1, 8))
 
 
 @pytest.mark.parametrize("size", [SMALL, FULL, (1920, 1080)])
 def test_two_hundred_statements_stay_legible_and_quick(opening: Opening, size: tuple[int, int]) -> None:
-    seen = opening(questionnaire(tuple(f"Statement {number}" for number in range(1, 201))), size)
-    parts = len(seen.page.parts)
+    participant = opening(questionnaire(tuple(f"Statement {number}" for number in range(1, 201))), size)
+    parts = len(participant.page.parts)
     for part in (0, parts // 2, parts - 1):
-        seen.page.go_to(seen.page.parts[part][0])
+        participant.page.go_to(participant.page.parts[part][0])
         QApplication.processEvents()
-        tabs = [tab for tab in seen.page.tabs if tab.isVisible()]
+        tabs = [tab for tab in participant.page.tabs if tab.isVisible()]
         assert len([tab for tab in tabs if tab.isChecked()]) == 1
         edges = sorted((tab.geometry().left(), tab.geometry().right()) for tab in tabs)
         assert all(right < left for (_, right), (left, _) in pairwise(edges))
-        assert edges[0][0] > seen.page.findChild(HeadingLabel).geometry().right()
-        assert edges[-1][1] < seen.page.width()
+        assert edges[0][0] > participant.page.findChild(HeadingLabel).geometry().right()
+        assert edges[-1][1] < participant.page.width()
         assert all(tab.fontMetrics().horizontalAdvance(tab.text()) < tab.width() for tab in tabs)
-    for _ in seen.page.parts[-1]:
-        seen.press(KEY.Key_4)
-    assert [value for _, value in seen.answers] == [4] * len(seen.page.parts[-1])
+    for _ in participant.page.parts[-1]:
+        participant.press(KEY.Key_4)
+    assert [value for _, value in participant.answers] == [4] * len(participant.page.parts[-1])

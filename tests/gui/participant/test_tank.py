@@ -1,4 +1,4 @@
-"""The tank: what is drawn and painted anew, when a view counts as painted, the words below, what moves."""
+"""The tank: drawing, repainted regions, the painted signal, captions and moving parts."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +16,7 @@ from study_app.gui.participant.tank.glass import _blur_image, brightness
 from study_app.gui.participant.tank.layers import OnsetPatch
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words
-from tests.gui.drawn import shown
+from tests.gui.drawn import grabbed_pixels
 from tests.gui.small import explore, follow, follow_view, reach, task_page, view
 
 Make = Callable[..., TankWidget]
@@ -26,12 +26,12 @@ WORKSPACE_M = (0.1, 0.06, 0.06)
 
 
 @pytest.fixture
-def tank(made: Make) -> TankWidget:
-    return made()
+def tank(make_tank: Make) -> TankWidget:
+    return make_tank()
 
 
 class Painted(QObject):
-    """Keeps which region of a widget is painted from now on."""
+    """A recorder of the region of a widget that is painted."""
 
     def __init__(self, widget: TankWidget) -> None:
         super().__init__(widget)
@@ -88,34 +88,34 @@ def test_right_is_right_up_is_up_near_is_large_and_the_ball_stays_in_the_glass(t
         (task_page(follow()), (follow_view(-0.02), follow_view(0.01))),
     ],
 )
-def test_what_changed_lies_inside_the_region_painted_anew(
-    made: Make, page: Any, views: tuple[Any, ...], qtbot: Any
+def test_changes_lie_inside_the_repainted_region(
+    make_tank: Make, page: Any, views: tuple[Any, ...], qtbot: Any
 ) -> None:
-    tank = made(page)
+    tank = make_tank(page)
     with qtbot.waitExposed(tank):
         tank.show()
     QApplication.processEvents()
     tank.show_view(views[0])
     for following in views[1:]:
-        before, painted = shown(tank), Painted(tank)
+        before, painted = grabbed_pixels(tank), Painted(tank)
         tank.show_view(following)
         region = QRegion(painted.region)
         assert not region.isEmpty()
-        differs = np.argwhere((before != shown(tank)).any(axis=2))
+        differs = np.argwhere((before != grabbed_pixels(tank)).any(axis=2))
         assert [(x, y) for y, x in differs if not region.contains(QPoint(int(x), int(y)))] == []
     assert len(differs) > 0
 
 
 def test_painted_comes_once_a_view_before_anything_else_is_done(tank: TankWidget, qtbot: Any) -> None:
     qtbot.waitExposed(tank)
-    told: list[int] = []
-    tank.painted.connect(told.append)
+    painted_ns: list[int] = []
+    tank.painted.connect(painted_ns.append)
     for sample_ns in (*range(1, 6), 5_123_456_789_012):
         tank.show_view(view((0.004 * min(sample_ns, 6), 0.0, 0.0), sample_ns=sample_ns))
-        assert told[-1] == sample_ns, "without a turn of the event loop"
+        assert painted_ns[-1] == sample_ns, "without a turn of the event loop"
     tank.repaint()  # as when the window is uncovered
     QApplication.processEvents()
-    assert told == [1, 2, 3, 4, 5, 5_123_456_789_012]
+    assert painted_ns == [1, 2, 3, 4, 5, 5_123_456_789_012]
     painted = Painted(tank)
     with qtbot.waitSignal(tank.painted, timeout=1000):  # nothing changed, but it is a frame
         tank.show_view(view((0.024, 0.0, 0.0)))
@@ -123,17 +123,17 @@ def test_painted_comes_once_a_view_before_anything_else_is_done(tank: TankWidget
 
 
 @pytest.mark.slow
-def test_a_view_that_nobody_can_see_is_told_of_when_it_is_seen(tank: TankWidget, qtbot: Any) -> None:
-    told: list[int] = []
-    tank.painted.connect(told.append)
+def test_a_hidden_view_is_reported_when_it_becomes_visible(tank: TankWidget, qtbot: Any) -> None:
+    painted_ns: list[int] = []
+    tank.painted.connect(painted_ns.append)
     tank.show_view(view(sample_ns=1))
     tank.hide()
     tank.show_view(view(sample_ns=2))
     tank.show_view(view(sample_ns=3))
-    assert told == [1]
+    assert painted_ns == [1]
     with qtbot.waitSignal(tank.painted, timeout=1000):
         tank.show()
-    assert told == [1, 3]
+    assert painted_ns == [1, 3]
 
 
 MM = 1e-3
@@ -169,7 +169,7 @@ def test_a_movement_faster_than_20_mm_per_s_after_100_ms_below_8_toggles_the_pat
     assert patch.lit is is_lit
 
 
-def test_the_speed_of_the_patch_is_taken_over_8_ms_in_all_three_directions() -> None:
+def test_the_speed_for_the_patch_is_measured_over_8_ms_in_three_dimensions() -> None:
     """The path of 0.15, 0.2 and 0.6 mm is 0.65 mm long: 20.1 mm/s over 32.3 ms, and 19.9 mm/s over 32.7 ms."""
     start_m, end_m = (0.01, 0.02, -0.03), (0.01015, 0.0198, -0.0294)
     for times_ns, is_lit in (
@@ -183,22 +183,22 @@ def test_the_speed_of_the_patch_is_taken_over_8_ms_in_all_three_directions() -> 
         assert [patch.follow_motion(end_m, time_ns) for time_ns in times_ns] == is_lit
 
 
-def test_patch_in_the_corner_turns_white_at_the_onset_unless_it_is_switched_off(made: Make) -> None:
+def test_patch_in_the_corner_turns_white_at_the_onset_unless_it_is_switched_off(make_tank: Make) -> None:
     for photodiode, colours in ((True, ["black", "white"]), (False, None)):
-        tank = made(photodiode=photodiode)
-        found = []
+        tank = make_tank(photodiode=photodiode)
+        patches = []
         for x, sample_ns in ((0.0, 1_000_000_000), (0.002, 1_016_000_000)):
             tank.show_view(view((x, 0, 0), sample_ns=sample_ns))
-            found.append(tank.grab().toImage().pixelColor(tank.width() - 10, tank.height() - 10))
+            patches.append(tank.grab().toImage().pixelColor(tank.width() - 10, tank.height() - 10))
         edge = tank.grab().toImage().pixelColor(tank.width() - PATCH_PX + 3, tank.height() - 10)
         if colours:
-            assert found == [QColor(one) for one in colours]
+            assert patches == [QColor(colour) for colour in colours]
         assert (edge == QColor("black")) is photodiode
 
 
-def test_the_ball_reaches_the_whole_workspace_between_floor_and_water(made: Make) -> None:
+def test_the_ball_reaches_the_whole_workspace_between_floor_and_water(make_tank: Make) -> None:
     ball_m, margin_m = 0.0034, 0.0025
-    around = type(made()._box).around
+    around = type(make_tank()._box).around
     box = around(WORKSPACE_M, ball_m)
     assert (-box.floor, box.water) == pytest.approx((0.03 + ball_m + margin_m,) * 2)
     assert box.top > box.water
@@ -207,13 +207,13 @@ def test_the_ball_reaches_the_whole_workspace_between_floor_and_water(made: Make
     assert (wide.x, wide.z) == pytest.approx((0.25 + ball_m + margin_m, 0.15 + ball_m + margin_m))
 
 
-def test_a_person_with_the_mouse_is_told_to_click(made: Make) -> None:
+def test_with_the_mouse_the_page_asks_for_a_click(make_tank: Make) -> None:
     spoken = words("en")
     for by_mouse, now, hint in (
         (False, spoken.continue_now, spoken.pause_hint),
         (True, spoken.click_now, spoken.pause_title),
     ):
-        shown_words = made(by_mouse=by_mouse)._words
+        shown_words = make_tank(by_mouse=by_mouse)._words
         assert (shown_words.continue_now, shown_words.pause_hint) == (now, hint)
 
 

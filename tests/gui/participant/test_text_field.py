@@ -11,8 +11,8 @@ from study_app.protocol.wording.languages import LANGUAGES
 SMILE, FAMILY, FLAG, ACCENT = "\U0001f600", "👨\u200d👩\u200d👧", "🇫🇷", "e\u0301"
 
 
-def written(app: QApplication, *parts: str, longest: int = 500, at: int | None = None) -> tuple[object, int]:
-    """Return the answer after an input method committed each part, and where the cursor stands in UTF-16 units.
+def commit_text(app: QApplication, *parts: str, longest: int = 500, at: int | None = None) -> tuple[object, int]:
+    """Return the answer after an input method committed each part, and the cursor position in UTF-16 units.
 
     The last part goes to the place ``at``, if there is one.
     """
@@ -36,21 +36,21 @@ def written(app: QApplication, *parts: str, longest: int = 500, at: int | None =
 
 
 def test_typing_goes_on_behind_a_line_break_after_emoji(qapp: QApplication) -> None:
-    assert written(qapp, f"{SMILE}{SMILE} one", "\ntwo", "!") == (f"{SMILE}{SMILE} one two!", 13)
+    assert commit_text(qapp, f"{SMILE}{SMILE} one", "\ntwo", "!") == (f"{SMILE}{SMILE} one two!", 13)
 
 
-def test_what_cannot_be_printed_leaves_the_cursor_between_the_same_characters(qapp: QApplication) -> None:
-    assert written(qapp, f"{SMILE}ab", "\x07x", at=3) == (f"{SMILE}axb", 4)
+def test_removed_control_characters_leave_the_cursor_between_the_same_characters(qapp: QApplication) -> None:
+    assert commit_text(qapp, f"{SMILE}ab", "\x07x", at=3) == (f"{SMILE}axb", 4)
 
 
 @pytest.mark.parametrize("character", [SMILE, FAMILY, FLAG, ACCENT, "👍🏽"])
-def test_the_length_counts_what_a_person_sees_and_cuts_no_character(qapp: QApplication, character: str) -> None:
-    assert written(qapp, character * 5, longest=3)[0] == character * 3
-    assert written(qapp, f"ab{character}", longest=2)[0] == "ab"
+def test_the_length_counts_visible_characters_and_never_splits_one(qapp: QApplication, character: str) -> None:
+    assert commit_text(qapp, character * 5, longest=3)[0] == character * 3
+    assert commit_text(qapp, f"ab{character}", longest=2)[0] == "ab"
     question = Text(id="w", kind="text", text="Describe", short="Words", longest=3)
     assert question.problem(character * 3, Context({}, None, "en")) is None
     assert question.problem(character * 4, Context({}, None, "en")) == "the text has 4 characters: write at most 3"
 
 
-def test_marks_without_end_are_no_single_character(qapp: QApplication) -> None:
-    assert written(qapp, "e" + "\u0301" * 100, longest=1) == ("e" + "\u0301" * 31, 32)
+def test_endless_combining_marks_do_not_count_as_one_character(qapp: QApplication) -> None:
+    assert commit_text(qapp, "e" + "\u0301" * 100, longest=1) == ("e" + "\u0301" * 31, 32)

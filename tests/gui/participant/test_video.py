@@ -10,7 +10,7 @@ from PySide6.QtCore import QRectF
 
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.video.frames import VideoFrame
-from tests.gui.drawn import shown
+from tests.gui.drawn import grabbed_pixels
 from tests.gui.small import follow, follow_view, task_page
 
 Make = Callable[..., TankWidget]
@@ -32,28 +32,28 @@ def frame(number: int, blue_green_red: tuple[int, int, int]) -> VideoFrame:
     )
 
 
-def seen(tank: TankWidget, video: VideoFrame | None) -> np.ndarray:
+def shown_pixels(tank: TankWidget, video: VideoFrame | None) -> np.ndarray:
     tank.show_view(replace(follow_view(ball=(0.03, 0.01, 0)), video=video))
-    return shown(tank)
+    return grabbed_pixels(tank)
 
 
 @pytest.mark.parametrize(
     ("place", "ratio", "size"), [((640, 361), 1.5, (960, 541)), ((3, 5), 0.75, (2, 3)), ((0, 0), 2.0, (2, 2))]
 )
-def test_frames_are_asked_for_in_pixels_of_the_screen_and_at_least_two_each_way(
-    made: Make, place: tuple[int, int], ratio: float, size: tuple[int, int]
+def test_frames_are_requested_in_screen_pixels_and_at_least_two_by_two(
+    make_tank: Make, place: tuple[int, int], ratio: float, size: tuple[int, int]
 ) -> None:
-    video = made(task_page(follow(), video=True)).video
+    video = make_tank(task_page(follow(), video=True)).video
     video.place = QRectF(7, 11, *place)
     assert video.size(ratio) == size
 
 
-def test_another_frame_is_painted_and_the_same_one_is_not(made: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    tank = made(task_page(follow(), video=True, overlay=False))
-    seen(tank, frame(0, BLUE))
+def test_a_new_frame_is_painted_but_not_the_same_one(make_tank: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    tank = make_tank(task_page(follow(), video=True, overlay=False))
+    shown_pixels(tank, frame(0, BLUE))
     second = frame(1, GREEN)
     middle = tuple(reversed([round(value) for value in tank.video.place.center().toTuple()]))
-    assert tuple(seen(tank, second)[middle]) == GREEN
+    assert tuple(shown_pixels(tank, second)[middle]) == GREEN
     painted: list[Any] = []
     monkeypatch.setattr(tank.video, "paint", lambda _painter, region: painted.append(region.boundingRect()))
     tank.show_view(replace(follow_view(ball=(0.03, 0.01, 0)), video=second))

@@ -46,10 +46,10 @@ CHECKS = (
 )
 
 
-def begun(window):
-    said = []
-    window.start_asked.connect(lambda: said.append("begun"))
-    return said
+def record_starts(window):
+    starts = []
+    window.start_asked.connect(lambda: starts.append("begun"))
+    return starts
 
 
 @pytest.mark.parametrize(
@@ -62,27 +62,27 @@ def begun(window):
     ],
 )
 @pytest.mark.parametrize("key", [Qt.Key.Key_Return, Qt.Key.Key_Enter])
-def test_enter_begins_once_and_accepts_what_the_button_names(window, qtbot, key, facts, passed, words):
-    said = begun(window)
+def test_enter_begins_once_with_the_action_of_the_button(window, qtbot, key, facts, passed, words):
+    starts = record_starts(window)
     window.show_view(checked(facts))
     assert (window.chip.word, window.start.text()) == (passed, words)
     look = {"Start": ("ok", "check"), "Cannot start": ("bad", "cross")}.get(words, ("warn", "warning"))
     assert (window.chip.tone, window.chip.icon, window.who.text()) == (*look, "rek2024  ·  Participant P007")
     qtbot.keyClick(window, key)
     qtbot.keyClick(window, key)
-    assert said == (["begun"] if window.start.isEnabled() else [])
+    assert starts == (["begun"] if window.start.isEnabled() else [])
     assert window.start.isEnabled() is (facts is not FULL_DISK)
 
 
-def test_enter_on_another_button_measures_anew_and_after_it_enter_begins(window, qtbot):
-    said = begun(window)
+def test_enter_on_measure_again_measures_and_the_next_enter_begins(window, qtbot):
+    said = record_starts(window)
     window.again.setFocus()
     with qtbot.waitSignal(window.again_asked):
         qtbot.keyClick(window.again, Qt.Key.Key_Return)
     window.show_view(checked(FULL_DISK, busy=True))
     assert not window.again.hasFocus()
     assert (window.start.isEnabled(), window.again.isEnabled()) == (False, False)
-    assert (window.chip.tone, window.chip.icon, window.chip.word) == ("neutral", "clock", "Measuring …")
+    assert (window.chip.tone, window.chip.icon, window.chip.word) == ("neutral", "clock", "Measuring…")
     window.show_view(checked(WELL))
     assert (window.start.isEnabled(), window.again.isEnabled(), window.start.hasFocus()) == (True, True, True)
     qtbot.keyClick(window.focusWidget() or window, Qt.Key.Key_Return)
@@ -90,7 +90,7 @@ def test_enter_on_another_button_measures_anew_and_after_it_enter_begins(window,
 
 
 @pytest.mark.parametrize("how", ["escape", "cancel", "close", "finish"])
-def test_one_goes_back_without_a_trace_and_finishing_is_not_going_back(window, qtbot, how):
+def test_going_back_leaves_no_trace_and_differs_from_finishing(window, qtbot, how):
     cancelled = []
     window.cancelled.connect(lambda: cancelled.append(how))
     if how == "escape":
@@ -155,7 +155,7 @@ def test_a_row_about_the_session_is_hidden_while_it_is_not_known(window):
         window.show_view(checked(WELL, asked_error=asked_error))
         labels = window.runs.findChildren(QLabel)
         (name,) = (label for label in labels if label.text() == "Expected force error")
-        (value,) = (label for label in labels if label.text() == "measuring …")
+        (value,) = (label for label in labels if label.text() == "measuring…")
         assert (name.isHidden(), value.isHidden()) == (is_hidden, is_hidden)
         assert [label.isHidden() for label in labels if label.text() in ("Ends about", "14:37")] == [False, False]
 
@@ -182,7 +182,7 @@ def test_the_page_keys_scroll_the_checks(window, qtbot):
     assert bar.value() == 0
 
 
-def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
+def test_a_resumed_session_states_its_position_and_stored_answers(window):
     protocol = load("demo")
     schedule = build_schedule(protocol, "P007", 5)
     first, second = (trial.number for trial in schedule.trials[:2])
@@ -208,7 +208,7 @@ def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
     assert {value.text() for value in window.values()} >= {"Liquid setting 2, attempt\u00a02", "2 of 8 answers"}
     assert checked(WELL).rows == (
         ("Parts", "2"), ("Settings", "10"), ("Answers", "62"), ("Expected time", "18 min"), ("Force limit", "8 N"),
-        ("Expected force error", "measuring …"), ("Ends about", "14:37"),
+        ("Expected force error", "measuring…"), ("Ends about", "14:37"),
     )  # fmt: skip
     errors = [dict(checked(WELL, error_n=error_n).rows)["Expected force error"] for error_n in (0.0099, 0.01, 0.256)]
     assert errors == ["< 0.01 N", "0.01 N", "0.26 N"]
@@ -237,12 +237,12 @@ def test_the_checks_of_devices_and_of_compiled_code() -> None:
     assert results[-1] == checks[-1]
 
 
-def test_the_check_of_a_computer_is_asked_for_again_once_it_is_over(qtbot) -> None:
+def test_the_check_of_a_computer_can_be_repeated_when_it_is_over(qtbot) -> None:
     parent = QWidget()
     qtbot.addWidget(parent)
     window = ComputerWindow(parent, LIGHT)
     window.show_measuring()
-    assert window.state.text().startswith("Measuring … On first use")
+    assert window.state.text().startswith("Measuring… On first use")
     assert (window.back.isEnabled(), window.bar.isHidden(), window.bar.maximum()) == (False, False, 0)
     window.show_compiled(0.6)
     assert (window.bar.value(), window.bar.maximum()) == (60, 100)
@@ -261,15 +261,15 @@ def test_a_haptic_device_is_asked_whether_its_motors_are_masked(qtbot) -> None:
     window = PreflightWindow(2000.0, asks_masking=True)
     qtbot.addWidget(window)
     window.show()
-    asked = window.masking
-    assert asked is not None
-    assert asked.answer() == Masking("no")
-    assert not asked.noise_db.isVisible()
+    masking = window.masking
+    assert masking is not None
+    assert masking.answer() == Masking("no")
+    assert not masking.noise_db.isVisible()
     for _ in range(2):
-        qtbot.keyClick(asked.means, Qt.Key.Key_Down)
-    assert asked.noise_db.isVisible()
-    assert (asked.noise_db.minimum(), asked.noise_db.maximum(), asked.noise_db.value()) == (30, 85, 60)
-    asked.noise_db.setValue(64)
-    assert asked.answer() == Masking("noise", 64)
-    qtbot.keyClick(asked.means, Qt.Key.Key_Up)
-    assert asked.answer().entry == {"means": "headphones", "noise_db": None}
+        qtbot.keyClick(masking.means, Qt.Key.Key_Down)
+    assert masking.noise_db.isVisible()
+    assert (masking.noise_db.minimum(), masking.noise_db.maximum(), masking.noise_db.value()) == (30, 85, 60)
+    masking.noise_db.setValue(64)
+    assert masking.answer() == Masking("noise", 64)
+    qtbot.keyClick(masking.means, Qt.Key.Key_Up)
+    assert masking.answer().entry == {"means": "headphones", "noise_db": None}

@@ -17,7 +17,7 @@ from study_app.gui.theme.themed import apply_theme
 from study_app.store.exclusions import Exclusion
 from tests.gui.results.sample import LEFT_OUT, SVG, facts, view
 from tests.gui.transcript import Actions, clicked, in_turn
-from tests.gui.windows import results, shown
+from tests.gui.windows import results, show_window
 
 NOW = datetime(2026, 11, 24, 12, tzinfo=UTC)
 STARTED = NOW - timedelta(days=1)
@@ -27,7 +27,7 @@ def of_results(**changes: Any) -> Callable[[Any], None]:
     return lambda window: window.place("results").show_view(view(**changes))
 
 
-def then(button: str, **changes: Any) -> Callable[[Any], None]:
+def press_then_show(button: str, **changes: Any) -> Callable[[Any], None]:
     """Return an action that presses a button of the figures, then shows other results."""
     return in_turn(lambda window: clicked(f"figures.{button}")(window.place("results")), of_results(**changes))
 
@@ -56,13 +56,13 @@ RESULTS: Actions = {
     ),
     "drawing": of_results(figures=(), drawing=Progress("drawing", 0.4)),
     "testing": of_results(testing=Progress("testing: Unusable", 0.7)),
-    "untested": then("work.stop", untested=True),
-    "trouble": then(
+    "untested": press_then_show("work.stop", untested=True),
+    "trouble": press_then_show(
         "work.again",
         figures=(),
         trouble=Trouble(title="It cannot be", sentence="P002 is damaged.", button="Look", remedy="again"),
     ),
-    "reading": then("trouble.button", sessions=(), figures=()),
+    "reading": press_then_show("trouble.button", sessions=(), figures=()),
     "no sessions": of_results(sessions=(), figures=(), listed=True),
     "no study": of_results(studies=(), chosen=None, sessions=(), figures=()),
     "stacked": lambda window: (window.resize(1024, 640), of_results()(window)),
@@ -73,9 +73,9 @@ def writing(qtbot: Any) -> QWidget:
     """Return the dialog that exports tables, over results in which SPSS files cannot be written."""
     window = results(qtbot).main
     window.place("results").export.click()
-    made: QWidget = window.place("results").writing
-    made.below = window  # type: ignore[attr-defined]  # or it would be collected here
-    return made
+    dialog: QWidget = window.place("results").writing
+    dialog.below = window  # type: ignore[attr-defined]  # or it would be collected here
+    return dialog
 
 
 WRITING: Actions = {
@@ -141,7 +141,7 @@ READ: dict[str, Any] = {}
 
 
 def read(what: str) -> Any:
-    """Return what is to be read, or raise it."""
+    """Return the record to read, or raise its error."""
     if isinstance(READ[what], Exception):
         raise READ[what]
     return READ[what]
@@ -150,21 +150,21 @@ def read(what: str) -> Any:
 def page(qtbot: Any) -> SessionPage:
     below = QWidget()
     qtbot.addWidget(below)
-    made: Any = SessionPage(below, LIGHT, RECORD.facts, lambda _path: None)
-    made.below = below
-    return shown(qtbot, made, (1040, 700))  # type: ignore[no-any-return]
+    session_page: Any = SessionPage(below, LIGHT, RECORD.facts, lambda _path: None)
+    session_page.below = below
+    return show_window(qtbot, session_page, (1040, 700))  # type: ignore[no-any-return]
 
 
 def read_again(**changed: Any) -> Callable[[Any], None]:
-    def act(made: Any) -> None:
+    def act(session_page: Any) -> None:
         READ.update(changed)
-        made.read_folder()
+        session_page.read_folder()
 
     return act
 
 
 PAGE: Actions = {
-    **{f"trial {row + 1}": lambda made, row=row: made.trials.selectRow(row) for row in (1, 2, 3)},  # type: ignore[misc]
+    **{f"trial {row + 1}": lambda session_page, row=row: session_page.trials.selectRow(row) for row in (1, 2, 3)},  # type: ignore[misc]
     "sealed": read_again(record=replace(RECORD, left_out=(), notes=())),
     "session excluded": read_again(
         record=replace(
@@ -184,5 +184,5 @@ PAGE: Actions = {
     ),
     "empty": read_again(record=replace(RECORD, trials=(), files=())),
     "unreadable": read_again(record=StoreError("the journal cannot be read")),
-    "dark": lambda made: apply_theme(made, DARK),
+    "dark": lambda session_page: apply_theme(session_page, DARK),
 }

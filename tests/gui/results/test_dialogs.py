@@ -1,4 +1,4 @@
-"""The dialogs of the results page: each asks what it says, and answers with what was chosen and typed."""
+"""The dialogs of the results page: their texts, and the choices and texts that they return."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,12 +30,12 @@ def exclusion(trial: int | None, by: str, at: str = "2026-03-09T12:00:00+00:00")
     )  # fmt: skip
 
 
-def asked(qtbot: Any, question: Question) -> tuple[str, str, str, list[str]]:
-    """Return title, explanation, button and further texts of a question; its fields refuse to be empty."""
+def confirm_question(qtbot: Any, question: Question) -> tuple[str, str, str, list[str]]:
+    """Return title, explanation, button and further texts of a question; check that its fields are required."""
     qtbot.addWidget(question)
     question.show()
     title = question.windowTitle()
-    texts = [shown.text() for shown in question.findChildren(QLabel) if shown.isVisible() and shown.text()]
+    texts = [label.text() for label in question.findChildren(QLabel) if label.isVisible() and label.text()]
     assert title in texts
     for name, sentence, value in (("by", NO_NAME, "AK"), ("reason", REASON, "slept")):
         question.accept()
@@ -50,7 +50,7 @@ def test_unblinding_states_its_consequences_and_how_many_sessions_are_incomplete
     parent = QWidget()
     qtbot.addWidget(parent)
     for count, begins in ((0, ""), (1, "1 session is not complete."), (3, "3 sessions are not complete.")):
-        title, explanation, button, texts = asked(qtbot, unblind_question(parent, LIGHT, "oils", count))
+        title, explanation, button, texts = confirm_question(qtbot, unblind_question(parent, LIGHT, "oils", count))
         assert (title, button) == ("Unblind oils?", "Unblind")
         assert explanation.startswith("Everyone who opens this study will see which condition each code stands for")
         assert "This cannot be undone." in explanation
@@ -59,16 +59,16 @@ def test_unblinding_states_its_consequences_and_how_many_sessions_are_incomplete
         assert warnings == ([f"{begins} {ending}"] if count else [])
 
 
-def test_an_exclusion_is_reversed_and_a_proposed_one_is_rejected(qtbot: Any) -> None:
+def test_an_exclusion_is_reversed_and_a_proposal_rejected(qtbot: Any) -> None:
     parent = QWidget()
     qtbot.addWidget(parent)
     ending = "Your name, the reason and the time are stored in exclusions_reversed.jsonl."
-    assert asked(qtbot, take_back_question(parent, LIGHT, exclusion(4, "BL")))[:3] == (
+    assert confirm_question(qtbot, take_back_question(parent, LIGHT, exclusion(4, "BL")))[:3] == (
         "Include again: P007, session 2, trial 4",
         f"Reason for the exclusion: “slept”. The data will be included again in measures, figures and tests. {ending}",
         "Include again",
     )
-    assert asked(qtbot, take_back_question(parent, LIGHT, exclusion(None, "fast_answers", "")))[:3] == (
+    assert confirm_question(qtbot, take_back_question(parent, LIGHT, exclusion(None, "fast_answers", "")))[:3] == (
         "Keep: P007, session 2",
         f"A rule proposed this exclusion: slept. The data will remain in measures, figures and tests. {ending}",
         "Keep",
@@ -92,7 +92,7 @@ def test_an_exclusion_is_of_the_chosen_session_and_trial_and_of_its_rule_only_if
     dialog = LeaveOutDialog(parent, LIGHT, sessions, trials, sessions[1])
     assert dialog.said.text().startswith("The chosen session or trial is excluded from measures, figures and tests.")
     assert (dialog.chosen, dialog.rule, dialog.value("reason")) == (("P007", 2, None), "", "")
-    title, _, button, texts = asked(qtbot, dialog)
+    title, _, button, texts = confirm_question(qtbot, dialog)
     assert (title, button, dialog.value("by")) == ("Exclude from the analysis", "Exclude", "AK")
     assert [text for text in texts if text in {"Session", "Scope", "By", "Reason"}] == [
         "Session", "Scope", "By", "Reason"

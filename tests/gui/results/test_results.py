@@ -1,4 +1,4 @@
-"""Results with their real place: rehearsed studies read, unblinded, left out of and reported."""
+"""The real results page: rehearsed studies are read, unblinded, excluded from and reported."""
 
 import multiprocessing
 import shutil
@@ -37,10 +37,10 @@ SOON_MS = 120_000
 
 
 class Here:
-    """Carries out orders here and at once, in place of a process; tells the answers when it is asked."""
+    """A worker that carries out orders at once in this process, and returns answers on request."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[int, Answer | Refused | Crashed]] = []
+        self.pending_answers: list[tuple[int, Answer | Refused | Crashed]] = []
         self.number = 0
         self.works = True
         self.stops = False
@@ -51,26 +51,26 @@ class Here:
         number = self.number
         try:
             last: Answer | Refused = carry_out(
-                order, lambda answer: self.told.append((number, answer)), lambda: self.stops
+                order, lambda answer: self.pending_answers.append((number, answer)), lambda: self.stops
             )
         except StudyError as error:
             last = Refused(str(error), stopped=self.stops)
-        self.told.append((number, last))
+        self.pending_answers.append((number, last))
         return number
 
     def stop(self) -> None:
         self.stops = True
 
     def answers(self) -> list[tuple[int, Answer | Refused | Crashed]]:
-        told, self.told = self.told, []
-        return told
+        answers, self.pending_answers = self.pending_answers, []
+        return answers
 
     def close(self) -> None:
         self.closed = True
 
 
 class Opened:
-    """A main window with results, and what was opened from there."""
+    """A main window with results, and the files opened from it."""
 
     def __init__(self, qtbot: QtBot, results: Path, start_worker: Callable[[], Any] = Here) -> None:
         self.qtbot = qtbot
@@ -118,64 +118,69 @@ def results(whole: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def shown(qtbot: QtBot, results: Path) -> Iterator[Opened]:
-    opened = Opened(qtbot, results)
-    yield opened
-    opened.window.close()
+def results_window(qtbot: QtBot, results: Path) -> Iterator[Opened]:
+    results_window = Opened(qtbot, results)
+    yield results_window
+    results_window.window.close()
 
 
-def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorded(shown: Opened, results: Path) -> None:
-    assert shown.chips == ["Simulated participants", "Blinded"]
-    assert shown.place.hidden.isVisible()
-    assert shown.titles == ["Agreement by condition", "Answers by condition"]
-    drawn = b"".join(card.figure.svg for card in shown.place.figures.cards)
+def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorded(
+    results_window: Opened, results: Path
+) -> None:
+    assert results_window.chips == ["Simulated participants", "Blinded"]
+    assert results_window.place.hidden.isVisible()
+    assert results_window.titles == ["Agreement by condition", "Answers by condition"]
+    drawn = b"".join(card.figure.svg for card in results_window.place.figures.cards)
     assert b">L1<" in drawn
     assert b">Thick<" not in drawn
-    assert [one.participant for one in shown.place.sessions.rows.shown] == ["P001", "P002", "P003"]
-    assert shown.place.view.testing is None
-    views, show_view = list[ResultsView](), shown.place.show_view
-    shown.place.show_view = lambda view: (views.append(view), show_view(view))  # type: ignore[method-assign]
-    shown.decide(shown.place.unblind, "AK", "collection closed")
-    opened = [view for view in views if view.opened]
-    assert any(view.figures for view in opened)
-    assert not [view for view in opened if any(b">L1<" in figure.svg for figure in view.figures)]
+    assert [session.participant for session in results_window.place.sessions.rows.shown] == ["P001", "P002", "P003"]
+    assert results_window.place.view.testing is None
+    views, show_view = list[ResultsView](), results_window.place.show_view
+    results_window.place.show_view = lambda view: (views.append(view), show_view(view))  # type: ignore[method-assign]
+    results_window.decide(results_window.place.unblind, "AK", "collection closed")
+    unblinded = [view for view in views if view.opened]
+    assert any(view.figures for view in unblinded)
+    assert not [view for view in unblinded if any(b">L1<" in figure.svg for figure in view.figures)]
     (record,) = reveals(results / "demo")
     assert (record["by"], record["reason"]) == ("AK", "collection closed")
-    assert shown.chips[1].endswith("by AK: collection closed")
-    assert not shown.place.unblind.isVisible()
-    assert not shown.place.hidden.isVisible()
-    assert shown.titles[:2] == ["Every participant's answers", "Answers as a function of added delay"]  # first page
-    assert "Agreement for each liquid" in shown.titles
-    questions = [card.question.text() for card in shown.place.figures.cards]
+    assert results_window.chips[1].endswith("by AK: collection closed")
+    assert not results_window.place.unblind.isVisible()
+    assert not results_window.place.hidden.isVisible()
+    assert results_window.titles[:2] == [
+        "Every participant's answers",
+        "Answers as a function of added delay",
+    ]  # first page
+    assert "Agreement for each liquid" in results_window.titles
+    questions = [card.question.text() for card in results_window.place.figures.cards]
     assert questions[0].endswith("Which liquids were distinguished?")
-    assert b">Thick<" in shown.place.figures.cards[0].figure.svg
-    stops = [button for card in shown.place.figures.cards for button in card.buttons if button.isVisible()]
+    assert b">Thick<" in results_window.place.figures.cards[0].figure.svg
+    stops = [button for card in results_window.place.figures.cards for button in card.buttons if button.isVisible()]
     stops[0].setFocus()
     passed = stops[:1]
     while len(passed) < len(stops):
-        shown.qtbot.keyClick(passed[-1], Qt.Key.Key_Tab)
-        passed.append(shown.window.focusWidget())
+        results_window.qtbot.keyClick(passed[-1], Qt.Key.Key_Tab)
+        passed.append(results_window.window.focusWidget())
     assert passed == stops, "Tab goes through the cards from top to bottom"
     for table in (results / "demo").rglob("*trials_data.csv"):
         assert b",force_mean_n," in table.read_bytes()
 
 
-def test_leaving_out_changes_foot_figures_and_list_until_it_is_taken_back(shown: Opened, results: Path) -> None:
-    before = shown.place.figures.cards[0].figure
-    assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
-    shown.place.sessions.rows.table.selectRow(1)
-    shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
-    assert [one.what for one in exclusions(results / "demo")] == [("P002", 1, None)]
-    assert shown.place.sessions.head.text() == "2 of 3 sessions in the figures"
-    assert shown.place.sessions.why.text() == "P002 is excluded."
-    (line,) = shown.place.exclusions.lines
+def test_an_exclusion_changes_footer_figures_and_list_until_it_is_undone(results_window: Opened, results: Path) -> None:
+    before = results_window.place.figures.cards[0].figure
+    assert results_window.place.sessions.head.text() == "3 of 3 sessions in the figures"
+    results_window.place.sessions.rows.table.selectRow(1)
+    results_window.decide(results_window.place.exclusions.leave_out, "AK", "fell asleep")
+    assert [exclusion.what for exclusion in exclusions(results / "demo")] == [("P002", 1, None)]
+    assert results_window.place.sessions.head.text() == "2 of 3 sessions in the figures"
+    assert results_window.place.sessions.why.text() == "P002 is excluded."
+    (line,) = results_window.place.exclusions.lines
     assert "fell asleep" in line.accessibleName()
-    assert "1 session is excluded." in shown.place.figures.cards[0].figure.caption
-    assert shown.place.figures.cards[0].figure != before
-    shown.decide(line.findChild(ActionButton), "CD", "wrong participant")
+    assert "1 session is excluded." in results_window.place.figures.cards[0].figure.caption
+    assert results_window.place.figures.cards[0].figure != before
+    results_window.decide(line.findChild(ActionButton), "CD", "wrong participant")
     assert exclusions(results / "demo") == ()
-    assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
-    assert not shown.place.exclusions.lines
+    assert results_window.place.sessions.head.text() == "3 of 3 sessions in the figures"
+    assert not results_window.place.exclusions.lines
 
 
 def choose(qtbot: QtBot, choice: Choice, text: str) -> None:
@@ -186,9 +191,9 @@ def choose(qtbot: QtBot, choice: Choice, text: str) -> None:
         qtbot.keyClick(choice, Qt.Key.Key_Down if down > 0 else Qt.Key.Key_Up)
 
 
-def copied_rows(opened: Opened, card: FigureCard) -> list[dict[str, str]]:
-    """Return what a card's Copy numbers puts on the clipboard, row by row."""
-    opened.click(card.copy_numbers)
+def copied_rows(results_window: Opened, card: FigureCard) -> list[dict[str, str]]:
+    """Return the rows that "Copy numbers" of a card puts on the clipboard."""
+    results_window.click(card.copy_numbers)
     head, *lines = [line.split("\t") for line in QGuiApplication.clipboard().text().splitlines()]
     return [dict(zip(head, line, strict=True)) for line in lines]
 
@@ -197,10 +202,10 @@ def test_figures_are_split_by_the_groups_that_unblinding_makes_known(qtbot: QtBo
     source, folder = tmp_path / "grouped.toml", tmp_path / "results" / "grouped"
     source.write_text(STUDY + GROUPS, encoding="utf-8", newline="\n")
     rehearse_answers(source, participants=6, seed=8, results=folder, features=made_up(str(source)))
-    opened = Opened(qtbot, folder.parent)
-    place = opened.place
+    results_window = Opened(qtbot, folder.parent)
+    place = results_window.place
     assert not place.split.isVisible(), "the groups are randomised and sealed"
-    opened.decide(place.unblind, "AK", "collection closed")
+    results_window.decide(place.unblind, "AK", "collection closed")
     assert place.split.isVisible()
 
     study = load_study(folder)
@@ -220,36 +225,36 @@ def test_figures_are_split_by_the_groups_that_unblinding_makes_known(qtbot: QtBo
     verdict = together.figure.verdict
     assert verdict
     choose(qtbot, place.split, "Side by side")
-    opened.wait()
+    results_window.wait()
     (compared,) = cards()
     assert compared.figure.question == together.figure.question
     assert not compared.figure.verdict, "the tests are of all participants"
-    rows = copied_rows(opened, compared)
+    rows = copied_rows(results_window, compared)
     assert {row["participant"]: row["group"] for row in rows[:6]} == members
-    found = {row["group"]: row for row in rows if row["participant"] == "mean"}
+    mean_rows = {row["group"]: row for row in rows if row["participant"] == "mean"}
     means = {
         (group, name): mean(group, liquid)
         for group in groups
         for name, liquid in (("Heavy Honey", "honey"), ("Heavy Water", "water"))
     }
-    assert {(group, name): float(found[group][name]) for group, name in means} == pytest.approx(means)
+    assert {(group, name): float(mean_rows[group][name]) for group, name in means} == pytest.approx(means)
     assert len(set(means.values())) == 4, "or any mean would do"
 
     choose(qtbot, place.split, f"Only {groups[1]}")
-    opened.wait()
+    results_window.wait()
     (alone,) = cards()
-    people = [row["participant"] for row in copied_rows(opened, alone) if row["participant"].startswith("P")]
+    people = [row["participant"] for row in copied_rows(results_window, alone) if row["participant"].startswith("P")]
     assert people == [person for person in sorted(members) if members[person] == groups[1]]
     choose(qtbot, place.split, "All together")
-    opened.wait()
+    results_window.wait()
     assert [card.figure.verdict for card in cards()] == [verdict]
-    opened.window.close()
+    results_window.window.close()
 
 
-def test_a_study_without_groups_has_no_choice_of_groups(shown: Opened) -> None:
-    shown.decide(shown.place.unblind, "AK", "collection closed")
-    assert not shown.place.split.isVisible()
-    assert {card.figure.split for card in shown.place.figures.cards} == {""}
+def test_a_study_without_groups_has_no_choice_of_groups(results_window: Opened) -> None:
+    results_window.decide(results_window.place.unblind, "AK", "collection closed")
+    assert not results_window.place.split.isVisible()
+    assert {card.figure.split for card in results_window.place.figures.cards} == {""}
 
 
 def cut_table(study: Path) -> None:
@@ -281,40 +286,40 @@ def none_complete(study: Path) -> None:
         (cut_exclusions, "The study cannot be read", "exclusions.csv", "Refresh", 0),
     ],
 )
-def test_what_cannot_be_shown_is_said_in_one_sentence(
+def test_unreadable_results_are_reported_in_one_sentence(
     qtbot: QtBot, results: Path, change: Callable[[Path], object], title: str, named: str, button: str, listed: int
 ) -> None:
     change(results / "demo")
-    opened = Opened(qtbot, results)
-    trouble = opened.place.figures.trouble
+    results_window = Opened(qtbot, results)
+    trouble = results_window.place.figures.trouble
     assert (trouble.title.text(), trouble.button.text()) == (title, button)
     assert named in trouble.sentence.text()
-    assert (len(opened.place.sessions.rows.shown), opened.titles) == (listed, [])
-    assert opened.place.report.isEnabled() == (listed > 0)
+    assert (len(results_window.place.sessions.rows.shown), results_window.titles) == (listed, [])
+    assert results_window.place.report.isEnabled() == (listed > 0)
     if title == "No studies yet":
-        opened.click(trouble.button)
-        assert opened.window.here == "home"
+        results_window.click(trouble.button)
+        assert results_window.window.here == "home"
 
 
 def test_a_written_report_is_opened_and_of_exported_tables_the_folder(
     qtbot: QtBot, results: Path, tmp_path: Path
 ) -> None:
-    opened, file = Opened(qtbot, results), tmp_path / "report" / "report.html"
+    results_window, file = Opened(qtbot, results), tmp_path / "report" / "report.html"
     for button, label, path in (
-        (opened.place.report, "Open the report", file),
-        (opened.place.export, "Open the folder", file.parent),
+        (results_window.place.report, "Open the report", file),
+        (results_window.place.export, "Open the folder", file.parent),
     ):
-        opened.click(button)
-        dialog: Any = opened.place.writing
+        results_window.click(button)
+        dialog: Any = results_window.place.writing
         dialog.editors["to"].show_value(str(file.parent))
-        chosen = () if button is opened.place.report else ("wide", "psych-ds")
+        chosen = () if button is results_window.place.report else ("wide", "psych-ds")
         for name in chosen:
             dialog.editors[name].control.setChecked(True)
         assert dialog.asked == (file.parent, chosen)
         dialog.show_written([file], ())
         assert dialog.go_on.text() == label
-        opened.click(dialog.go_on)
-        assert opened.files.pop() == path
+        results_window.click(dialog.go_on)
+        assert results_window.files.pop() == path
         dialog.reject()
 
 
@@ -323,42 +328,42 @@ def nobody_left() -> bool:
 
 
 @pytest.mark.nightly
-def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_left(
+def test_a_report_in_worker_processes_is_cancelled_then_written_without_leftovers(
     qtbot: QtBot, results: Path, tmp_path: Path
 ) -> None:
-    opened = Opened(qtbot, results, start_analysis_worker)
-    assert opened.titles == ["Agreement by condition", "Answers by condition"]
+    results_window = Opened(qtbot, results, start_analysis_worker)
+    assert results_window.titles == ["Agreement by condition", "Answers by condition"]
     assert not nobody_left()
-    opened.click(opened.place.report)
-    dialog: Any = opened.place.writing
+    results_window.click(results_window.place.report)
+    dialog: Any = results_window.place.writing
     dialog.editors["to"].show_value(str(tmp_path / "report"))
-    opened.click(dialog.go_on)
-    opened.click(dialog.back)
-    qtbot.waitUntil(lambda: opened.place.writing is None, timeout=SOON_MS)
+    results_window.click(dialog.go_on)
+    results_window.click(dialog.back)
+    qtbot.waitUntil(lambda: results_window.place.writing is None, timeout=SOON_MS)
     assert not (tmp_path / "report").exists()
-    opened.click(opened.place.report)
-    dialog = opened.place.writing
+    results_window.click(results_window.place.report)
+    dialog = results_window.place.writing
     dialog.editors["to"].show_value(str(tmp_path / "report"))
-    opened.click(dialog.go_on)
-    opened.wait()
-    opened.click(dialog.go_on)
-    assert opened.files == [tmp_path / "report" / "report.html"]
-    assert opened.files[0].is_file()
+    results_window.click(dialog.go_on)
+    results_window.wait()
+    results_window.click(dialog.go_on)
+    assert results_window.files == [tmp_path / "report" / "report.html"]
+    assert results_window.files[0].is_file()
     dialog.reject()
-    opened.window.close()
+    results_window.window.close()
     qtbot.waitUntil(nobody_left, timeout=SOON_MS)
 
 
 @pytest.mark.nightly
-def test_a_process_that_is_killed_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
-    opened = Opened(qtbot, results, start_analysis_worker)
-    reader: Any = opened.place.reader
+def test_a_killed_process_is_reported_and_restarted(qtbot: QtBot, results: Path) -> None:
+    results_window = Opened(qtbot, results, start_analysis_worker)
+    reader: Any = results_window.place.reader
     psutil.Process(reader.process.pid).suspend()  # or it may answer before it is killed
-    opened.place.read_studies()
+    results_window.place.read_studies()
     reader.process.kill()
-    qtbot.waitUntil(lambda: "bug in the program" in opened.place.figures.trouble.title.text(), timeout=SOON_MS)
-    opened.click(opened.place.figures.trouble.button)
-    opened.wait()
-    assert len(opened.titles) == 2
-    opened.window.close()
+    qtbot.waitUntil(lambda: "bug in the program" in results_window.place.figures.trouble.title.text(), timeout=SOON_MS)
+    results_window.click(results_window.place.figures.trouble.button)
+    results_window.wait()
+    assert len(results_window.titles) == 2
+    results_window.window.close()
     qtbot.waitUntil(nobody_left, timeout=SOON_MS)

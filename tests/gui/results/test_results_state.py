@@ -1,4 +1,4 @@
-"""What the results window says in words, and a figure in the colours of a theme."""
+"""Texts of the results window, and figures in the colours of a theme."""
 
 import pytest
 from PySide6.QtCore import QSize
@@ -23,12 +23,12 @@ def test_many_that_are_not_are_counted():
     assert figure_counts(held)[1] == "P001, P002, P003, P004 and 5 others are not complete."
 
 
-def test_an_excluded_session_that_was_not_complete_is_told_once():
+def test_an_incomplete_excluded_session_is_mentioned_once():
     assert figure_counts([facts("P001", status="withdrawn", excluded="left")])[1] == "P001 is excluded."
 
 
 @pytest.mark.parametrize(
-    ("words", "status", "found"),
+    ("words", "status", "expected"),
     [
         ("", "", ["P001", "P002", "Q003"]),
         (" p00", "", ["P001", "P002"]),
@@ -39,31 +39,31 @@ def test_an_excluded_session_that_was_not_complete_is_told_once():
         ("novice", "", ["P002"]),
     ],
 )
-def test_sessions_are_found_by_participant_and_state(words, status, found):
+def test_sessions_are_found_by_participant_and_state(words, status, expected):
     held = [
         facts("P001", validity="invalid"),
         facts("P002", status="unfinished", group="novices"),
         facts("Q003", excluded="x"),
     ]
-    assert [one.participant for one in held if session_filter(words, status)(one)] == found
+    assert [session.participant for session in held if session_filter(words, status)(session)] == expected
     assert [state for state, _ in occurring_states(held)] == ["completed", "unfinished", "invalid", "excluded"]
 
 
 def test_in_the_light_theme_a_figure_looks_as_in_print():
-    made = themed_svg(SVG, COLOURS, LIGHT)
+    themed = themed_svg(SVG, COLOURS, LIGHT)
     for role in ("text", "accent", "grid"):
-        assert getattr(LIGHT, role).encode().lower() in made.lower()
-    assert b"#02256d" in made
+        assert getattr(LIGHT, role).encode().lower() in themed.lower()
+    assert b"#02256d" in themed
 
 
 def test_in_the_dark_theme_paper_and_letters_change_and_levels_do_not():
-    made = themed_svg(SVG, COLOURS, DARK)
-    assert COLOURS["text"].encode() not in made
-    assert f'id="paper" style="fill: {DARK.surface}"'.encode() in made
-    assert f'id="level7" style="fill: #02256d; stroke: {DARK.ctl}"'.encode() in made
-    assert b'fill: #ffffff" id="white">7<' in made, "letters on a dark level stay white"
-    assert f'fill: {DARK.text}" id="ink"'.encode() in made
-    assert b'id="shade" style="fill: #0b65a3; fill-opacity: 0.3"' in made, "a shade under light letters stays deep"
+    themed = themed_svg(SVG, COLOURS, DARK)
+    assert COLOURS["text"].encode() not in themed
+    assert f'id="paper" style="fill: {DARK.surface}"'.encode() in themed
+    assert f'id="level7" style="fill: #02256d; stroke: {DARK.ctl}"'.encode() in themed
+    assert b'fill: #ffffff" id="white">7<' in themed, "letters on a dark level stay white"
+    assert f'fill: {DARK.text}" id="ink"'.encode() in themed
+    assert b'id="shade" style="fill: #0b65a3; fill-opacity: 0.3"' in themed, "a shade under light letters stays deep"
 
 
 def test_a_figure_is_drawn_at_the_screens_resolution(qapp):

@@ -35,8 +35,8 @@ def click(qtbot, button):
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
-def decided(qtbot, place, by, reason):
-    """Press the button of a dialog without a name, then with a name and a reason; return what is ordered."""
+def confirm_decision(qtbot, place, by, reason):
+    """Confirm a dialog without a name, then with name and reason; return the resulting order."""
     dialog = place.dialog
     click(qtbot, dialog.go_on)
     assert dialog.isVisible()
@@ -51,7 +51,7 @@ def decided(qtbot, place, by, reason):
 
 def test_sessions_are_searched_and_filtered(place, qtbot):
     def shown():
-        return [one.participant for one in place.sessions.rows.shown]
+        return [session.participant for session in place.sessions.rows.shown]
 
     qtbot.keyClicks(place.sessions.search, "p00")
     assert len(shown()) == 7
@@ -78,7 +78,7 @@ def test_the_group_stands_below_the_participant_and_can_be_searched(place, qtbot
     assert said == ["P031, novice", "P032, expert", "P033, novice"]
     assert place.sessions.search.placeholderText() == "Participant or group"
     qtbot.keyClicks(place.sessions.search, "Nov")
-    assert [one.participant for one in place.sessions.rows.shown] == ["P031", "P033"]
+    assert [session.participant for session in place.sessions.rows.shown] == ["P031", "P033"]
 
 
 def test_rows_are_chosen_by_the_keyboard_and_the_choice_begins_the_dialog(place, qtbot):
@@ -106,7 +106,7 @@ def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
         "Whole session", "Trial 2: Part 1, L2", "Trial 3: Part 1, L1"
     ]  # fmt: skip
     dialog.editors["trial"].control.setCurrentIndex(2)
-    assert decided(qtbot, place, "AK", "phone rang") == LeaveOut(
+    assert confirm_decision(qtbot, place, "AK", "phone rang") == LeaveOut(
         folder=place.view.chosen, participant="P001", session=1, trial=3, by="AK", reason="phone rang"
     )
 
@@ -119,15 +119,15 @@ def test_an_answer_stands_above_its_figure_which_can_be_copied_and_saved(place, 
     """Qt takes a list of font families for one name, which no font has."""
     drawn = []
     monkeypatch.setattr(figures, "QSvgRenderer", lambda svg: drawn.append(svg) or QSvgRenderer(svg))
-    asked = {
+    figure_fields = {
         "question": "Which liquids were distinguished?",
         "verdict": "shown",
         "answer": "Both were (p < .001, d_z 0.46).",
     }
-    first = replace(view().figures[0], numbers="participant\twater\nP001\t3.0\n", **asked)
+    first = replace(view().figures[0], numbers="participant\twater\nP001\t3.0\n", **figure_fields)
     place.show_view(view(figures=(first, *view().figures[1:])))
     card, other = place.figures.cards
-    assert card.question.text() == asked["question"]
+    assert card.question.text() == figure_fields["question"]
     assert card.answer.text() == "Both were (p &lt; .001, d<sub>z</sub> 0.46)."
     assert not other.question.isVisible()
     assert not other.copy_numbers.isVisible()
@@ -138,14 +138,14 @@ def test_an_answer_stands_above_its_figure_which_can_be_copied_and_saved(place, 
     QGuiApplication.clipboard().clear()
     for name, begin in (("a.svg", b"<?xml"), ("b.png", b"\x89PNG"), ("c.PDF", b"%PDF"), ("d", b"%PDF")):
         card.save_to(tmp_path / name)
-        (made,) = tmp_path.glob(f"{name}*")
-        assert made.read_bytes().startswith(begin)
+        (saved,) = tmp_path.glob(f"{name}*")
+        assert saved.read_bytes().startswith(begin)
     assert (tmp_path / "d.pdf").is_file()
     assert drawn
     assert all(re.findall(rb"font-family: (.*?);", svg) == [b"Inter"] * 2 for svg in drawn)
-    with qtbot.waitSignal(place.message) as told:
+    with qtbot.waitSignal(place.message) as message:
         card.save_to(tmp_path / "none" / "a.png")
-    assert "cannot be written" in told.args[1]
+    assert "cannot be written" in message.args[1]
 
 
 def test_a_click_on_a_participants_point_opens_the_session(place, qtbot):
@@ -170,25 +170,25 @@ def test_a_click_on_a_participants_point_opens_the_session(place, qtbot):
 
 def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
     click(qtbot, place.unblind)
-    said = " ".join(one.text() for one in place.dialog.findChildren(QLabel))
+    said = " ".join(label.text() for label in place.dialog.findChildren(QLabel))
     assert "1 session is not complete" in said
     assert "cannot be undone" in said
-    assert decided(qtbot, place, "AK", "closed") == OpenKey(place.view.chosen, "AK", "closed")
-    assert (place.unblind.text(), place.unblind.isEnabled()) == ("Unblinding …", False)
+    assert confirm_decision(qtbot, place, "AK", "closed") == OpenKey(place.view.chosen, "AK", "closed")
+    assert (place.unblind.text(), place.unblind.isEnabled()) == ("Unblinding…", False)
     place.show_view(replace(place.view, drawing=Progress("opening session 2 of 3", 0.25, stops=False)))
     work, panel = place.figures.work, place.figures
-    assert (work.words.whole, work.bar.share, work.stop.isVisible()) == ("Opening session 2 of 3 …", 0.25, False)
+    assert (work.words.whole, work.bar.share, work.stop.isVisible()) == ("Opening session 2 of 3…", 0.25, False)
     assert panel.viewport().rect().contains(work.mapTo(panel.viewport(), work.rect().center())), (
         "it is not scrolled out"
     )
 
 
-def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
+def test_an_exclusion_is_undone_with_a_name_and_a_reason(place, qtbot):
     place.show_view(replace(view(), left_out=(LEFT_OUT,)))
     back = place.exclusions.lines[0].findChild(ActionButton)
     assert back.accessibleName() == "Include again: P003, trial 4"
     click(qtbot, back)
-    assert decided(qtbot, place, "CD", "wrong trial") == TakeBack(
+    assert confirm_decision(qtbot, place, "CD", "wrong trial") == TakeBack(
         folder=place.view.chosen, participant="P003", session=1, trial=4, by="CD", reason="wrong trial"
     )
     back.setFocus()
@@ -196,7 +196,7 @@ def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
     assert place.window().focusWidget() is place.exclusions.leave_out
 
 
-def test_what_a_rule_proposes_is_excluded_or_kept_by_a_person(place, qtbot):
+def test_a_proposed_exclusion_is_decided_by_a_person(place, qtbot):
     proposed = replace(LEFT_OUT, trial=None, rule_or_person="below_chance", reason="0 of 40", excluded_at="")
     rule = "Planned rule: a block has fewer correct answers than expected by chance. 1 session met this rule."
     place.show_view(replace(view(left_out=()), rules=(rule.replace("1", "No"),)))
@@ -213,7 +213,7 @@ def test_what_a_rule_proposes_is_excluded_or_kept_by_a_person(place, qtbot):
         ("P003", 1), None, "", "0 of 40"
     ]  # fmt: skip
     assert any(
-        "P003 meets the exclusion rule “below chance”. " in one.text() for one in place.dialog.findChildren(QLabel)
+        "P003 meets the exclusion rule “below chance”. " in label.text() for label in place.dialog.findChildren(QLabel)
     )
     place.dialog.editors["by"].show_value("AB")
     click(qtbot, place.dialog.go_on)
@@ -222,7 +222,7 @@ def test_what_a_rule_proposes_is_excluded_or_kept_by_a_person(place, qtbot):
         rule="below_chance",
     )  # fmt: skip
     click(qtbot, keep)
-    assert decided(qtbot, place, "CD", "left-handed") == TakeBack(
+    assert confirm_decision(qtbot, place, "CD", "left-handed") == TakeBack(
         folder=place.view.chosen, participant="P003", session=1, trial=None, by="CD", reason="left-handed",
         rule="below_chance",
     )  # fmt: skip
@@ -240,23 +240,21 @@ TRIAL = DECISION | {"participant": "P002", "session": 1, "trial": 3}
         (OpenKey(**DECISION), "The study is still blinded"),
     ],
 )
-def test_a_decision_that_is_refused_says_what_stays_and_the_study_is_read_again(place, qtbot, decision, stays):
+def test_a_failed_decision_is_reported_and_the_study_is_read_again(place, qtbot, decision, stays):
     place._send_order(decision, "deciding")
-    with qtbot.waitSignal(place.message) as told:
+    with qtbot.waitSignal(place.message) as message:
         place._handle_answer(len(place.reader.orders), Refused("the disk is full"))
-    assert told.args == [stays, "the disk is full."]
+    assert message.args == [stays, "the disk is full."]
     assert place.reader.orders[-1] == ReadStudy(decision.folder)
 
 
 @pytest.mark.parametrize("sealed", [True, False])
-def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_what_cannot_be_written(
-    place, qtbot, monkeypatch, sealed
-):
+def test_outputs_explain_codes_of_a_sealed_study_and_unavailable_formats(place, qtbot, monkeypatch, sealed):
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     place.show_view(view(sealed=sealed))
     for button in (place.export, place.report):
         click(qtbot, button)
-        said = [one.text() for one in place.writing.findChildren(QLabel)]
+        said = [label.text() for label in place.writing.findChildren(QLabel)]
         (explanation,) = (text for text in said if "very " in text)
         assert explanation.endswith("Conditions appear as codes because the study is blinded.") is sealed
         if button is place.export:
@@ -275,6 +273,6 @@ def test_text_of_figures_is_at_least_11_px_high(place, qtbot, tmp_path):
             view(figures=(FigureDrawn(name=block.id, title="Title", caption="Caption", svg=svg), *view().figures[1:]))
         )
         drawing = place.figures.cards[0].drawing
-        qtbot.waitUntil(lambda shown=drawing: shown.is_settled)
+        qtbot.waitUntil(lambda waited=drawing: waited.is_settled)
         sizes_pt = [float(size) for size in re.findall(rb"font(?:-size)?: (?:bold )?([0-9.]+)px", svg)]
         assert min(sizes_pt) * drawing.width() / style.PAGE_WIDTH_PT >= 11

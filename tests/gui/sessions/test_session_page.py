@@ -1,4 +1,4 @@
-"""A session's page: what it reads of a folder, and what it shows."""
+"""The page of a session: reading its folder and showing it."""
 
 import re
 import shutil
@@ -27,7 +27,7 @@ from study_app.store.session_progress.missing_trials import MISSING_PERCENT, Mis
 from study_app.store.unblinding import unblind
 from tests.golden import compare, each_once, what_comes
 from tests.golden_values import changed
-from tests.gui.transcript import told
+from tests.gui.transcript import widget_lines
 from tests.journal_lines import event_of
 from tests.studies import begun
 
@@ -47,7 +47,7 @@ def study(whole, tmp_path):
     return Path(shutil.copytree(whole, tmp_path / "results" / "demo"))
 
 
-def held(study):
+def begin_demo(study):
     """Begin a session of the demo."""
     return begun(study, "P007", operator="AK")
 
@@ -60,22 +60,22 @@ def trial(store, number, **measured):
 
 def unconfirmed(study):
     """Hold a session in which the choices of the second trial were not confirmed."""
-    with held(study) as store:
+    with begin_demo(study) as store:
         for number in (1, 2):
             trial(store, number)
             for value in (3, 5):
                 store.append(journal_events.Choice(trial=number, item="feels_liquid", value=value))
             if number == 1:
-                given = {"item": "feels_liquid", "number": 1, "value": 5, "changes": 1}
+                answer = {"item": "feels_liquid", "number": 1, "value": 5, "changes": 1}
                 times = {"onset_s": 0.0, "first_s": 0.1, "last_s": 0.2}
-                store.append(event_of("responses", trial=1, attempt=1, items=[given | times]))
+                store.append(event_of("responses", trial=1, attempt=1, items=[answer | times]))
         store.finish("aborted")
     return StudyFolder(study).session("P007", 1).path
 
 
 def measured(study):
-    """Hold a session with a trial that kept the limits and one that broke two, and a note on it."""
-    with held(study) as store:
+    """Hold a session with a valid trial, a trial that exceeded two limits, and a note."""
+    with begin_demo(study) as store:
         trial(store, 1, worst_gap_ms=3.0, lateness_p99_ms=0.2, first_frame_gap_ms=12.0)
         trial(store, 2, worst_gap_ms=41.26, lateness_p99_ms=2.5, first_frame_gap_ms=12.0)
         store.append(journal_events.RecordingLost(trial=1, attempt=1, reason="its thread ended"))
@@ -99,17 +99,17 @@ CELLS = {
 def page_of(qtbot, study, participant=None):
     window = QWidget()
     qtbot.addWidget(window)
-    facts = next(one for one in sessions(study.parent, {}) if participant in (None, one.participant))
-    opened = []
-    page = SessionPage(window, LIGHT, facts, opened.append)
-    page.opened, page.window_below = opened, window
+    facts = next(session for session in sessions(study.parent, {}) if participant in (None, session.participant))
+    files_opened = []
+    page = SessionPage(window, LIGHT, facts, files_opened.append)
+    page.opened, page.window_below = files_opened, window
     page.show()
     qtbot.addWidget(page)
     qtbot.waitUntil(lambda: page.record is not None)
     return page
 
 
-def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot, tmp_path, pytestconfig):
+def test_a_page_describes_each_trial_and_explains_an_unreadable_session(qtbot, tmp_path, pytestconfig):
     lines, before = [], []
     for hold in (unconfirmed, measured):
         study = tmp_path / hold.__name__ / "demo"
@@ -119,7 +119,7 @@ def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot,
         for row in range(page.model.rowCount()):
             page.trials.selectRow(row)
             # Qt before 6.12 tells the name of a table as its value, too.
-            after = [line.replace(str(study), "STUDY").removesuffix(" |  | =") for line in told(page)]
+            after = [line.replace(str(study), "STUDY").removesuffix(" |  | =") for line in widget_lines(page)]
             lines += [f"== {hold.__name__}, trial {row + 1}", *changed(before, after)]
             before = after
     page.folder.click()
@@ -202,7 +202,7 @@ def test_missing_trials_are_counted_and_compared_with_those_permitted(permitted,
 
 def test_a_sealed_session_beyond_a_sealed_limit_is_out_of_limits_before_unblinding_already(tmp_path):
     study = tmp_path / "results" / "demo"
-    with held(study) as store:
+    with begin_demo(study) as store:
         trial(store, 1, withheld_share=0.02)
         trial(store, 2, withheld_share=0.2, loop_delay_ticks=1, device_delay_ticks=3)
         store.finish("completed")

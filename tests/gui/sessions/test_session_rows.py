@@ -43,15 +43,13 @@ def facts(**changes: Any) -> SessionFacts:
     return replace(FACTS, **changes)
 
 
-def cell(shown: Any, *headings: str) -> list[tuple[str, ...]]:
+def cell(row: Any, *headings: str) -> list[tuple[str, ...]]:
     """Return text, spoken text and tip of the cells under headings."""
     cells = (
-        _session_cell(shown, heading, NOW)
-        if isinstance(shown, SessionFacts)
-        else session_page._trial_cell(shown, heading)
+        _session_cell(row, heading, NOW) if isinstance(row, SessionFacts) else session_page._trial_cell(row, heading)
         for heading in headings
     )
-    return [tuple(dict.fromkeys(str(one[role]) for role in TEXTS)) for one in cells]
+    return [tuple(dict.fromkeys(str(data[role]) for role in TEXTS)) for data in cells]
 
 
 def setting(codes: list[Any], **changes: Any) -> str:
@@ -59,8 +57,8 @@ def setting(codes: list[Any], **changes: Any) -> str:
     return session_page._setting_text(row, {"b": dict([codes])} if codes else {})
 
 
-def choices(*given: Any) -> tuple[str, ...]:
-    answers: Any = {item: SimpleNamespace(value=value, first_s=first_s) for item, value, first_s in given}
+def choices(*answer_rows: Any) -> tuple[str, ...]:
+    answers: Any = {item: SimpleNamespace(value=value, first_s=first_s) for item, value, first_s in answer_rows}
     return session_page._choice_texts(answers)
 
 
@@ -70,7 +68,7 @@ NAMES = {
         "occurring_states",
     )},
     "facts": facts, "trial": lambda **changes: replace(TRIAL, **changes), "cell": cell, "setting": setting,
-    "choices": choices, "chip": session_page._trial_chip, "counted": lambda shown: shown.is_counted,
+    "choices": choices, "chip": session_page._trial_chip, "counted": lambda row: row.is_counted,
     "began": lambda at: session_facts.start_time_text(datetime.fromisoformat(f"{at}+00:00"), NOW),
     "in_folder": lambda folder, **changes: facts(folder=Path(f"results/{folder}/data/sub-P7/ses-02"), **changes),
     "MISSING": Missing(brief="3 of 40 not delivered", long="3 trials of 40"),
@@ -79,6 +77,6 @@ NAMES = {
 
 @pytest.mark.usefixtures("qapp")
 def test_each_call_has_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SessionFacts, "version", property(lambda shown: "1.2" if shown.session == 2 else ""))
+    monkeypatch.setattr(SessionFacts, "version", property(lambda row: "1.2" if row.session == 2 else ""))
     file = Path(__file__).with_name("rows.txt")
     check_kept(file, played(file, calls(NAMES)))

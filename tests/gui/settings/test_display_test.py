@@ -47,7 +47,7 @@ def figures_of(frames_ms, least_s=0.1):
     return times.figure_texts()
 
 
-def test_rate_gaps_and_missed_refreshes_are_those_of_the_last_ten_seconds():
+def test_rate_gaps_and_missed_refreshes_cover_the_last_ten_seconds():
     assert figures_of(FRAMES_MS) == FIGURES
     assert (figures_of((0, 200)), figures_of((0, 50, 99))) == (UNKNOWN, UNKNOWN)
     assert figures_of((0, 60, 100)) == ("20.0 of 50.0 Hz", "60.00 ms", "60.00 ms", "3")
@@ -58,13 +58,13 @@ def test_rate_gaps_and_missed_refreshes_are_those_of_the_last_ten_seconds():
     assert [FrameTimes(rate_hz).refresh_hz for rate_hz in (0.0, -1.0, 0.5)] == [60.0, 60.0, 0.5]
 
 
-def test_the_patch_toggles_when_the_interval_is_over_and_painted_frames_alone_are_counted(test_page, clock, qtbot):
-    seen = []
+def test_the_patch_toggles_after_each_interval_and_only_painted_frames_count(test_page, clock, qtbot):
+    states = []
     for at_ms in (499, 500, 999, 1000):
         clock.now = round(1e6 * at_ms)
         test_page.draw_frame()
-        seen.append((test_page.lit, test_page.toggles))
-    assert seen == [(False, 0), (True, 1), (True, 1), (False, 2)]
+        states.append((test_page.lit, test_page.toggles))
+    assert states == [(False, 0), (True, 1), (True, 1), (False, 2)]
     for typed, interval_ms in (("100", 100.0), ("49", 100.0), ("5001", 100.0), ("", 500.0)):
         control = test_page.interval.control
         control.selectAll()
@@ -85,11 +85,11 @@ def test_the_patch_toggles_when_the_interval_is_over_and_painted_frames_alone_ar
 
 
 @pytest.mark.slow
-def test_frames_are_asked_for_while_it_is_shown_and_no_longer(qtbot):
-    made = display_test(qtbot)
-    made.start_frames()
-    qtbot.waitUntil(lambda: made.times.figure_texts()[0] != "–")
-    with qtbot.waitSignal(made.left):
-        qtbot.keyClick(made, Qt.Key.Key_Escape)
-    assert not made.frames.findChild(QTimer).isActive()
-    assert not made.report_timer.isActive()
+def test_frames_are_requested_only_while_the_test_is_shown(qtbot):
+    test_page = display_test(qtbot)
+    test_page.start_frames()
+    qtbot.waitUntil(lambda: test_page.times.figure_texts()[0] != "–")
+    with qtbot.waitSignal(test_page.left):
+        qtbot.keyClick(test_page, Qt.Key.Key_Escape)
+    assert not test_page.frames.findChild(QTimer).isActive()
+    assert not test_page.report_timer.isActive()

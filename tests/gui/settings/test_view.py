@@ -1,4 +1,4 @@
-"""The machine's place: the display test, and what is typed."""
+"""The settings page of the machine: the display test and typed values."""
 
 from dataclasses import replace
 
@@ -15,9 +15,9 @@ from tests.gui.windows import SCREENS, machine, show_settings, two_screens
 
 @pytest.fixture
 def real_place(qtbot):
-    made = machine(qtbot)
-    yield made
-    made.leave()
+    place = machine(qtbot)
+    yield place
+    place.leave()
 
 
 def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
@@ -92,10 +92,10 @@ def test_each_field_shows_its_setting_and_hands_on_a_new_one(real_place, qtbot, 
         stamps="https://a.b/c", stamp_root=str(tmp_path.parent), theme="dark", sound=True,
     )  # fmt: skip
     show_settings(real_place, settings, undo="the width")
-    shown = {name: editor.value for name, editor in real_place.editors.items()}
+    values = {name: editor.value for name, editor in real_place.editors.items()}
     assert real_place.editors["device"].isAncestorOf(real_place.devices)
     assert all(real_place.isAncestorOf(editor) for editor in real_place.editors.values())
-    assert shown == {name: getattr(settings, name) for name in shown} | {"device": "falcon"}
+    assert values == {name: getattr(settings, name) for name in values} | {"device": "falcon"}
     assert (real_place.undo.text(), real_place.undo.isEnabled()) == ("Undo the width", True)
     assert (real_place.folder.whole, real_place.kept_in.whole) == ("/there", "Saved in /there/machine.json")
     for name, value in (("photodiode", True), ("lsl_markers", False), ("sound", False)):
@@ -115,11 +115,13 @@ def test_each_field_shows_its_setting_and_hands_on_a_new_one(real_place, qtbot, 
 
 
 @pytest.mark.slow
-def test_each_button_asks_for_what_it_says(real_place, qtbot, monkeypatch):
+def test_each_button_sends_its_request(real_place, qtbot, monkeypatch):
     two_screens(monkeypatch)
     show_settings(real_place, MachineSettings(), undo="the width")
-    asked, chosen = [], iter(["", "/new"])
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *given: asked.append(given) or next(chosen))
+    dialogs, chosen = [], iter(["", "/new"])
+    monkeypatch.setattr(
+        QFileDialog, "getExistingDirectory", lambda *arguments: dialogs.append(arguments) or next(chosen)
+    )
     with qtbot.assertNotEmitted(real_place.changed):
         real_place.change.click()
     for signal, act, said in (
@@ -138,7 +140,7 @@ def test_each_button_asks_for_what_it_says(real_place, qtbot, monkeypatch):
         with qtbot.waitSignal(signal) as heard:
             act()
         assert heard.args == said
-    assert asked == [(real_place, "Workspace", "/there")] * 2
+    assert dialogs == [(real_place, "Workspace", "/there")] * 2
 
 
 @pytest.mark.slow
@@ -175,7 +177,7 @@ def test_a_sample_has_the_size_that_participants_see(
     assert real_place.editors["screen_width_mm"].below.text() == reported + used
 
 
-def test_what_is_being_typed_stays_if_something_else_is_set(real_place, qtbot):
+def test_typing_stays_while_another_setting_changes(real_place, qtbot):
     camera = real_place.editors["camera"].control
     qtbot.keyClicks(camera, "v4l2:/dev/vid")
     show_settings(real_place, MachineSettings(theme="dark", camera="tcp://127.0.0.1:5000"))
@@ -193,7 +195,7 @@ def test_a_screen_without_a_reported_width_is_described(real_place, monkeypatch)
 @pytest.mark.parametrize(
     ("name", "good", "bad"), [("proofs", ".", "nowhere"), ("stamps", "https://a.b/c", "a.b"), ("stamp_root", ".", "x")]
 )
-def test_where_proofs_go_is_set_and_taken_back_here(real_place, qtbot, tmp_path, monkeypatch, name, good, bad):
+def test_the_folder_of_proofs_is_set_and_reset_here(real_place, qtbot, tmp_path, monkeypatch, name, good, bad):
     monkeypatch.chdir(tmp_path)
     editor = real_place.editors[name]
     for typed, value in ((good, good), ("", MachineSettings.model_fields[name].default)):

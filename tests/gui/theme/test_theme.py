@@ -23,8 +23,8 @@ def luminance(colour: str) -> float:
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
-def contrast(one: str, other: str) -> float:
-    lighter, darker = sorted((luminance(one), luminance(other)), reverse=True)
+def contrast(colour: str, other_colour: str) -> float:
+    lighter, darker = sorted((luminance(colour), luminance(other_colour)), reverse=True)
     return (lighter + 0.05) / (darker + 0.05)
 
 
@@ -40,11 +40,11 @@ EDGES = tuple(itertools.product(("ctl", "trace_x", "trace_y", "trace_z", "accent
 
 def test_texts_reach_4_5_and_edges_of_controls_and_traces_3() -> None:
     weak = {
-        (theme.name, ink, ground): found
+        (theme.name, ink, ground): ratio
         for theme in THEMES
         for least, pairs in ((4.5, TEXTS), (3.0, EDGES))
         for ink, ground in pairs
-        if (found := contrast(getattr(theme, ink), getattr(theme, ground))) < least
+        if (ratio := contrast(getattr(theme, ink), getattr(theme, ground))) < least
     }
     assert weak == {}
     assert min(contrast(getattr(TANK, role), TANK.water_light) for role in ("lit", "proxy_light")) >= 3.0
@@ -53,8 +53,8 @@ def test_texts_reach_4_5_and_edges_of_controls_and_traces_3() -> None:
 def test_inter_is_the_packages_own_and_has_its_four_weights(qapp: object) -> None:
     assert "Inter" in load_fonts()
     for weight in (400, 500, 600, 700):
-        found = QFontInfo(font("body", weight=weight))
-        assert (found.family(), found.weight()) == ("Inter", weight)
+        info = QFontInfo(font("body", weight=weight))
+        assert (info.family(), info.weight()) == ("Inter", weight)
 
 
 @pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)

@@ -1,4 +1,4 @@
-"""A trial watched again in real windows: compared with the numbers of its recording, blinded, damaged, exported."""
+"""The window that replays a trial: compared with its recording, blinded, damaged, exported."""
 
 import shutil
 import sys
@@ -45,9 +45,9 @@ def whole(sealed, tmp_path_factory):
 
 
 @pytest.fixture
-def opened(qtbot):
-    """Return what opens a trial of a study by a click on its session's page."""
-    kept = []
+def open_trial(qtbot):
+    """Return a function that opens a trial of a study by a click on its session's page."""
+    windows = []
 
     def open_trial(study, row=ROW):
         below = QWidget()
@@ -59,29 +59,29 @@ def opened(qtbot):
         page.trials.selectRow(row)
         qtbot.mouseClick(page.watch, Qt.MouseButton.LeftButton)
         window = page.watched
-        kept.append((below, window))
-        qtbot.waitUntil(lambda: window.stage is not None or window.sentence.text() != "Reading …")
+        windows.append((below, window))
+        qtbot.waitUntil(lambda: window.stage is not None or window.sentence.text() != "Reading…")
         return window
 
     yield open_trial
-    for _, window in kept:
-        for one in filter(None, (window.export_dialog, window)):
-            one.close()
+    for _, window in windows:
+        for widget in filter(None, (window.export_dialog, window)):
+            widget.close()
 
 
 def recorded(study, name=TRIAL):
-    """Return a recording's samples, and the times since its task began [s], found without the program's window."""
+    """Return a recording's samples and the times since its task began [s], read without the program's window."""
     samples = recordings.read_samples(study / "data" / "sub-P001" / "ses-01" / name)
     own = samples.time_ns[samples.scene == samples.scene[-1]]
     return samples, (samples.time_ns - own[0]) * 1e-9
 
 
-def said(window):
+def visible_text(window):
     return " | ".join(part.text() for part in window.findChildren(QLabel) if part.isVisible())
 
 
-def test_every_moment_is_the_recordings(opened, whole):
-    window = opened(whole)
+def test_every_moment_is_the_recordings(open_trial, whole):
+    window = open_trial(whole)
     samples, times_s = recorded(whole)
     stage = window.stage
     for at in (0, 700, 3000, len(samples) - 1):
@@ -108,7 +108,7 @@ def test_every_moment_is_the_recordings(opened, whole):
     assert len(targets) > count
     answers = [mark.text for mark in stage.shown.marks if mark.kind == "answer"]
     assert answers[-1] == "answers confirmed"
-    assert {one.split(":")[0] for one in answers[:-1]} == {"harder", "comfortable"}
+    assert {text.split(":")[0] for text in answers[:-1]} == {"harder", "comfortable"}
     window.go(stage.shown.marks[1].at_s + 0.001)
     assert stage.happened.whole.endswith("target 2 reached")
     assert stage.tank.view.task.reached == 2
@@ -128,20 +128,20 @@ def test_each_line_of_the_journal_has_its_mark(event, fields, mark):
     assert _mark_text(event_of(event, **fields)) == mark
 
 
-def test_the_time_line_has_a_mark_of_its_own_colour_at_each_moment(qtbot):
+def test_the_time_line_marks_each_event_in_its_colour(qtbot):
     moments = {"target": 2.0, "answer": 5.0, "event": 8.0}
     marks = [SimpleNamespace(kind=kind, at_s=at_s) for kind, at_s in moments.items()]
     line = _TimeLine(SimpleNamespace(begins_s=0.0, ends_s=10.0, marks=marks))
     qtbot.addWidget(line)
     line.resize(400, 40)
     line.show_time(0.0)
-    seen = line.grab().toImage()
-    drawn = [seen.pixelColor(round(line._position_of(at_s)), 6).name() for at_s in moments.values()]
+    image = line.grab().toImage()
+    drawn = [image.pixelColor(round(line._position_of(at_s)), 6).name() for at_s in moments.values()]
     assert drawn == [QColor(ink).name() for ink in (line.theme.ok, line.theme.accent, line.theme.text2)]
 
 
-def test_keys_mouse_and_speed_move_through_time(opened, whole, qtbot, monkeypatch):
-    window = opened(whole)
+def test_keys_mouse_and_speed_move_through_time(open_trial, whole, qtbot, monkeypatch):
+    window = open_trial(whole)
     stage, (_, times_s) = window.stage, recorded(whole)
     clock = [100.0]
     monkeypatch.setattr("study_app.gui.watch.window.time.perf_counter", lambda: clock[0])
@@ -185,8 +185,10 @@ def test_keys_mouse_and_speed_move_through_time(opened, whole, qtbot, monkeypatc
     assert (window.playing, stage.at_s) == (True, stage.shown.begins_s)
 
 
-def test_the_ball_is_as_late_as_on_the_screen(opened, whole, qtbot):
-    window = next(one for one in (opened(whole, row) for row in (2, 3)) if one.presented.word == "late")
+def test_the_ball_is_as_late_as_on_the_screen(open_trial, whole, qtbot):
+    window = next(
+        candidate for candidate in (open_trial(whole, row) for row in (2, 3)) if candidate.presented.word == "late"
+    )
     window.go(2.0)
     assert window.seen.toolTip().startswith("Shows the ball with the delay that the participant saw;")
     hand_ns = window.stage.tank.view.sample_time_ns
@@ -202,22 +204,22 @@ def test_the_ball_is_as_late_as_on_the_screen(opened, whole, qtbot):
         (None, "is sealed until the study is unblinded: run liquid-study unblind"),
     ],
 )
-def test_what_cannot_be_read_is_one_line(opened, sealed, whole, tmp_path, harm, words):
+def test_an_unreadable_recording_is_reported_in_one_line(open_trial, sealed, whole, tmp_path, harm, words):
     study = Path(shutil.copytree(whole if harm else sealed, tmp_path / "results" / "demo"))
     if harm:
         harm(study / "data" / "sub-P001" / "ses-01" / TRIAL)
-    window = opened(study)
+    window = open_trial(study)
     assert words in window.sentence.text()
     assert "\n" not in window.sentence.text()
     assert not any(part.isEnabled() for part in (window.play, window.export, window.speed, *window.steps.values()))
-    assert "thick" not in said(window)
+    assert "thick" not in visible_text(window)
 
 
-def test_without_its_frames_a_trial_is_shown_and_one_line_says_what_is_missing(opened, whole, tmp_path):
+def test_a_trial_without_frames_is_shown_with_a_line_about_the_missing_file(open_trial, whole, tmp_path):
     study = Path(shutil.copytree(whole, tmp_path / "results" / "demo"))
     (frames,) = (study / "data" / "sub-P001" / "ses-01").glob(TRIAL.replace(".parquet", "*frames*"))
     frames.unlink()
-    window = opened(study)
+    window = open_trial(study)
     assert window.stage.forces.sent.yData.max() > 0.1
     assert (window.lacking.isVisible(), window.seen.isVisible()) == (True, False)
     assert window.lacking.text().startswith(f"The frames of the participant's screen are missing: {frames}")
@@ -227,28 +229,30 @@ def test_without_its_frames_a_trial_is_shown_and_one_line_says_what_is_missing(o
 
 
 def test_while_the_study_is_blinded_nothing_tells_force_delay_or_condition(
-    opened, sealed, whole, tmp_path, monkeypatch
+    open_trial, sealed, whole, tmp_path, monkeypatch
 ):
     study = Path(shutil.copytree(sealed, tmp_path / "results" / "demo"))
     for file in (whole / "data").rglob("*.parquet"):  # as of an earlier version, whose recordings were not sealed
         shutil.copy(file, study / file.relative_to(whole))
-    assert "the recorded motion would reveal the liquid" in opened(study).sentence.text()
+    assert "the recorded motion would reveal the liquid" in open_trial(study).sentence.text()
     monkeypatch.setattr("study_app.session.watch.reason_motion_is_hidden", lambda *_: "")
     for row in range(4):
-        window = opened(study, row)
+        window = open_trial(study, row)
         window.go(2.0)
         assert window.stage.forces is None
         assert [arrow.name for arrow in window.stage.tank.arrows] in ([], ["velocity"])
         assert (window.seen.isVisible(), len(window.stage.shown.painted_s)) == (False, 0)
-        assert " N" not in said(window)
-        assert not [name for name in load("demo").conditions if name in f"{said(window)} {window.presented.word}"]
+        assert " N" not in visible_text(window)
+        assert not [
+            name for name in load("demo").conditions if name in f"{visible_text(window)} {window.presented.word}"
+        ]
         assert window.presented.word == "Blinded: shown as a code"
 
 
-def test_a_video_shows_what_the_window_shows(opened, whole, qtbot, tmp_path):
+def test_an_exported_video_shows_the_picture_of_the_window(open_trial, whole, qtbot, tmp_path):
     import av
 
-    window = opened(whole)
+    window = open_trial(whole)
     window.speed.setCurrentIndex(window.speed.findData(4.0))
     window.go(2.0)
     picture = window.stage.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)  # kept: its bytes are compared
@@ -268,13 +272,13 @@ def test_a_video_shows_what_the_window_shows(opened, whole, qtbot, tmp_path):
     assert len(frames) == int(np.ceil(span_s * 30 / 4))
     near = frames[round((2.0 - window.stage.shown.begins_s) * 30 / 4)]
     pixels = np.frombuffer(picture.constBits(), np.uint8).reshape(picture.height(), -1, 4)
-    shown = pixels[: near.shape[0], : near.shape[1]]
-    assert np.abs(near[..., :3].astype(int) - shown[..., :3]).mean() < 3
+    window_pixels = pixels[: near.shape[0], : near.shape[1]]
+    assert np.abs(near[..., :3].astype(int) - window_pixels[..., :3]).mean() < 3
 
 
-def test_without_the_extra_the_export_says_what_to_install(opened, whole, qtbot, tmp_path, monkeypatch):
+def test_without_the_extra_the_export_names_the_package(open_trial, whole, qtbot, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
-    window = opened(whole)
+    window = open_trial(whole)
     window.export.click()
     window.export_dialog.editors["to"].show_value(str(tmp_path))
     qtbot.mouseClick(window.export_dialog.go_on, Qt.MouseButton.LeftButton)
@@ -282,18 +286,18 @@ def test_without_the_extra_the_export_says_what_to_install(opened, whole, qtbot,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_intervals_are_chosen_and_nothing_is_cut(opened, tmp_path, qtbot):
+def test_intervals_are_chosen_and_nothing_is_cut(open_trial, tmp_path, qtbot):
     source = tmp_path / "levels.toml"
     source.write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8", newline="\n")
     study = tmp_path / "results" / "levels"
     rehearse(str(source), participants=1, seed=1, results=study)
     unblind(study, by="AK", reason="over")
-    window = opened(study, 0)
-    first, seen = window.stage, {window.presented.word}
+    window = open_trial(study, 0)
+    first, presented = window.stage, {window.presented.word}
     assert window.interval.count() == first.shown.page.interval.of == 2
     window.interval.activated.emit(1)
     qtbot.waitUntil(lambda: window.stage is not None and window.stage is not first)
-    assert seen | {window.presented.word} == {"standard", "comparison"}
+    assert presented | {window.presented.word} == {"standard", "comparison"}
     assert window.stage.shown.page.interval.number == 2
     for size in ((window.minimumSizeHint().width(), 560), (984, 580), (1366, 768), (1880, 1020)):
         settle(window, size)

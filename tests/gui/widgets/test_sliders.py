@@ -62,7 +62,7 @@ def test_numbers_are_read_as_people_write_them(text: str, value: float | None) -
 
 @pytest.mark.slow
 @given(st.floats(-1e6, 1e6).filter(lambda value: abs(value) > 1e-3), st.integers(3, 6))
-def test_what_is_written_can_be_read(value: float, decimals: int) -> None:
+def test_written_numbers_can_be_read(value: float, decimals: int) -> None:
     assert read_number(write_number(value, decimals)) == pytest.approx(value, abs=0.51 * 10**-decimals, rel=0.01)
 
 
@@ -77,22 +77,22 @@ def test_a_small_number_is_never_written_as_nothing() -> None:
 def field(qtbot: Any) -> Any:
     window = QWidget()
     column = QVBoxLayout(window)
-    made: Any = NumberField()
-    made.other = NumberField()
-    column.addWidget(made)
-    column.addWidget(made.other)
+    number_field: Any = NumberField()
+    number_field.other = NumberField()
+    column.addWidget(number_field)
+    column.addWidget(number_field.other)
     qtbot.addWidget(window)
     window.show()
     window.activateWindow()
-    made.setFocus()
-    made.told = []
-    made.entered.connect(made.told.append)
-    made.unread.connect(made.told.append)
-    made.abandoned.connect(lambda: made.told.append("back"))
-    made.stepped.connect(lambda steps: made.told.append(("step", steps)))
-    made.show_text("45")
-    qtbot.waitUntil(made.hasFocus)
-    yield made
+    number_field.setFocus()
+    number_field.signals = []
+    number_field.entered.connect(number_field.signals.append)
+    number_field.unread.connect(number_field.signals.append)
+    number_field.abandoned.connect(lambda: number_field.signals.append("back"))
+    number_field.stepped.connect(lambda steps: number_field.signals.append(("step", steps)))
+    number_field.show_text("45")
+    qtbot.waitUntil(number_field.hasFocus)
+    yield number_field
     window.close()
 
 
@@ -106,18 +106,18 @@ def test_return_or_leaving_takes_a_number_once_and_escape_goes_back(field: Any, 
     qtbot.keyClick(field, Qt.Key.Key_Return)
     qtbot.keyClick(field, Qt.Key.Key_Return)
     field.other.setFocus()
-    assert field.told == [60.0]
+    assert field.signals == [60.0]
     type_over(field, "60,5")
     field.setFocus()
     field.other.setFocus()
-    assert field.told == [60.0, 60.5]
+    assert field.signals == [60.0, 60.5]
     field.setFocus()
     field.show_text("45")
     type_over(field, "70")
     qtbot.keyClick(field, Qt.Key.Key_Escape)
     field.other.setFocus()
     assert field.text() == "45"
-    assert field.told == [60.0, 60.5, "back"]
+    assert field.signals == [60.0, 60.5, "back"]
 
 
 @pytest.mark.parametrize(("reason", "selected"), [("Tab", "45"), ("Backtab", "45"), ("Mouse", "")])
@@ -128,18 +128,18 @@ def test_the_tab_key_selects_the_number_that_it_leads_to(field: Any, reason: str
     assert field.selectedText() == selected
 
 
-def test_what_is_no_number_stays_to_be_mended(field: Any, qtbot: Any) -> None:
+def test_invalid_text_stays_for_correction(field: Any, qtbot: Any) -> None:
     type_over(field, "4..5")
     qtbot.keyClick(field, Qt.Key.Key_Return)
     field.show_text("45")
-    assert field.told == ["4..5"]
+    assert field.signals == ["4..5"]
     assert field.text() == "4..5"
 
 
-def test_up_and_down_step_and_what_is_being_typed_is_not_overwritten(field: Any, qtbot: Any) -> None:
+def test_up_and_down_step_and_typing_is_not_overwritten(field: Any, qtbot: Any) -> None:
     qtbot.keyClick(field, Qt.Key.Key_Up)
     qtbot.keyClick(field, Qt.Key.Key_Down)
-    assert field.told == [("step", 1), ("step", -1)]
+    assert field.signals == [("step", 1), ("step", -1)]
     type_over(field, "6")
     field.show_text("45.5")
     assert field.text() == "6"
@@ -191,7 +191,7 @@ def test_return_submits_a_rejected_number_again_and_escape_restores_it(field: An
     assert (field.state, field.font().weight()) == ("", font("label").weight())
     for key in (Qt.Key.Key_Return, Qt.Key.Key_Escape):
         qtbot.keyClick(field, key)
-    assert field.told == [45.0, 45.0, "back"]
+    assert field.signals == [45.0, 45.0, "back"]
 
 
 def test_keys_mouse_and_screen_readers_move_a_slider_and_only_a_dragged_knob_is_held(qtbot: Any) -> None:

@@ -24,7 +24,7 @@ from study_app.gui.widgets.main_view import last_focused
 from study_app.gui.widgets.row_table import Rows, Table
 
 
-def test_what_was_changed_is_painted_at_once_and_not_again_later(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changes_are_painted_at_once_and_only_once(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     painted: list[int] = []
     paint = TracePlot.paintEvent
     monkeypatch.setattr(TracePlot, "paintEvent", lambda self, event: (painted.append(1), paint(self, event))[1])
@@ -45,7 +45,7 @@ def test_what_was_changed_is_painted_at_once_and_not_again_later(qtbot: Any, mon
     assert len(painted) == 5
 
 
-def test_only_the_newest_of_what_was_asked_for_comes(qtbot: Any) -> None:
+def test_only_the_newest_job_delivers_its_result(qtbot: Any) -> None:
     parent = QObject()
     background, came, go_on = Background(parent), [], threading.Event()
     background.done.connect(came.append)
@@ -92,8 +92,8 @@ def test_the_end_of_the_program_waits_for_jobs_but_not_for_ever() -> None:
 
 
 def test_a_job_that_outlives_qt_ends_without_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[Any] = []
-    monkeypatch.setattr(threading, "excepthook", told.append)
+    exceptions: list[Any] = []
+    monkeypatch.setattr(threading, "excepthook", exceptions.append)
     parent, go_on = QObject(), threading.Event()
     background = Background(parent)
     monkeypatch.setattr(background, "_outcomes", type(background._outcomes)())
@@ -104,7 +104,7 @@ def test_a_job_that_outlives_qt_ends_without_a_word(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("study_app.gui.widgets.background._program_ends", ended)
     go_on.set()
     assert background.wait(10)
-    assert told == []
+    assert exceptions == []
 
 
 @pytest.mark.slow
@@ -112,12 +112,12 @@ def test_a_role_goes_with_its_widget(qtbot: Any) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     for number in range(600):
-        made = label(f"Heading {number}", "card")
-        made.setParent(window)
+        heading = label(f"Heading {number}", "card")
+        heading.setParent(window)
         child = QAccessible.queryAccessibleInterface(window).child(0)
         assert child.role() == QAccessible.Role.Heading
-        made.setParent(None)
-        made.deleteLater()
+        heading.setParent(None)
+        heading.deleteLater()
         QTest.qWait(0)
 
 
@@ -128,7 +128,7 @@ def test_a_tick_has_a_minus_sign_and_thin_spaces(value: float, text: str) -> Non
     assert tick_text(value) == text
 
 
-def test_a_clamped_text_is_replaced_and_its_tip_has_what_was_left_out(qtbot: Any) -> None:
+def test_a_clamped_text_is_replaced_and_its_tip_has_the_full_text(qtbot: Any) -> None:
     clamped = Clamped("Honey", 2)
     qtbot.addWidget(clamped)
     clamped.show()
@@ -136,11 +136,11 @@ def test_a_clamped_text_is_replaced_and_its_tip_has_what_was_left_out(qtbot: Any
     assert (clamped.text(), clamped.toolTip()) == ("Honey", "")
     long = "Glycerin with a little more water than in the block before, at a delay of 35 ms"
     clamped.show_text(long)
-    shown = clamped.text().splitlines()
-    assert len(shown) == 2
-    assert shown[0].startswith("Glycerin")
-    assert shown[1].endswith("…")
-    assert long.startswith(" ".join(shown).removesuffix("…"))
+    lines = clamped.text().splitlines()
+    assert len(lines) == 2
+    assert lines[0].startswith("Glycerin")
+    assert lines[1].endswith("…")
+    assert long.startswith(" ".join(lines).removesuffix("…"))
     assert clamped.accessibleName() == long
     assert "35 ms" in clamped.toolTip()
 
@@ -150,22 +150,22 @@ def role_of(widget: QWidget) -> QAccessible.Role:
 
 
 def test_titles_are_headings_and_each_label_has_its_role_font_and_literal_text(qtbot: Any) -> None:
-    made = title, plain, _, number = (
+    labels = title, plain, _, number = (
         label("<b>A & B</b>", "title"),
         label("plain", "title", "warn", wraps=True, heading=False, weight=700),
         label("forced", "body", "text3", heading=True),
         figures("12.5", "body", "bad", weight=600),
     )
-    for widget in made:
+    for widget in labels:
         qtbot.addWidget(widget)
     heading, text = QAccessible.Role.Heading, QAccessible.Role.StaticText
-    assert [role_of(widget) for widget in made] == [heading, text, heading, text]
-    assert [widget.property("role") for widget in made] == ["text", "warn", "text3", "bad"]
-    assert [widget.wordWrap() for widget in made] == [False, True, False, False]
+    assert [role_of(widget) for widget in labels] == [heading, text, heading, text]
+    assert [widget.property("role") for widget in labels] == ["text", "warn", "text3", "bad"]
+    assert [widget.wordWrap() for widget in labels] == [False, True, False, False]
     assert (title.textFormat(), title.accessibleName()) == (Qt.TextFormat.PlainText, "<b>A & B</b>")
     assert plain.font() == font("title", weight=700)
     assert number.font() == font("body", weight=600, tabular=True)
-    assert [widget.sizePolicy().hasHeightForWidth() for widget in made] == [False, True, False, False]
+    assert [widget.sizePolicy().hasHeightForWidth() for widget in labels] == [False, True, False, False]
     set_ink(number, "ok")
     assert number.property("role") == "ok"
     title.setText("new")
@@ -226,9 +226,9 @@ def test_a_card_has_its_title_a_chip_its_word_and_a_bar_its_share(qtbot: Any) ->
     assert (chip.tone, chip.icon, chip.word, chip.accessibleName()) == ("warn", "warning", *["Not ready at all"] * 2)
     assert chip.sizeHint().width() > width
     assert panel.accessibleName() == "Hidden. The study is blind."
-    for share, shown in ((0.4, 0.4), (1.2, 1.0), (-0.1, 0.0)):
+    for share, expected in ((0.4, 0.4), (1.2, 1.0), (-0.1, 0.0)):
         bar.show_share(share, 0.7)
-        assert (bar.share, bar.tick) == (shown, 0.7)
+        assert (bar.share, bar.tick) == (expected, 0.7)
     assert (area.widget().findChild(QLabel).text(), area.widgetResizable()) == ("x", True)
     icon = Icon("check", "ok", 24)
     qtbot.addWidget(icon)
@@ -247,26 +247,26 @@ def test_buttons_are_pressed_by_enter_and_their_key_and_keep_it_with_another_tex
     button, other = ActionButton("repeat", "Refresh", key="F5"), IconButton("trash", "Discard it", size=36)
     stop = CompactStop("Stop force and play", "Esc")
     vbox(button, other, stop, parent=window)
-    for name, made in (("refresh", button), ("discard", other)):
-        made.clicked.connect(lambda _checked, name=name: pressed.append(name))
+    for name, widget in (("refresh", button), ("discard", other)):
+        widget.clicked.connect(lambda _checked, name=name: pressed.append(name))
     window.show()
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
-    for count, text in enumerate(("Refresh", "Looking …"), 1):
+    for count, text in enumerate(("Refresh", "Looking…"), 1):
         button.show_action("repeat", text)
         qtbot.keyClick(window, Qt.Key.Key_F5)
         qtbot.waitUntil(lambda count=count: len(pressed) == count and not button.isDown())
-    for made in (button, other):
+    for widget in (button, other):
         for key in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space):
-            qtbot.keyClick(made, key)
+            qtbot.keyClick(widget, key)
     assert pressed == ["refresh"] * 5 + ["discard"] * 3
     wide = button.sizeHint().width()
-    button.show_action("", "Looking …")
-    assert (button.text(), wide - button.sizeHint().width()) == ("Looking …", 28)
+    button.show_action("", "Looking…")
+    assert (button.text(), wide - button.sizeHint().width()) == ("Looking…", 28)
     button.set_role("primary")
     assert (button.role, button.property("role")) == ("primary", "primary")
     assert (other.accessibleName(), other.toolTip(), other.width()) == ("Discard it", "Discard it", 36)
-    assert IconButton("trash", "Discard it", "Discard …").toolTip() == "Discard …"
+    assert IconButton("trash", "Discard it", "Discard…").toolTip() == "Discard…"
     assert (stop.property("role"), other.property("dense")) == ("stop", "true")
     assert (stop.accessibleName(), stop.toolTip()) == (
         "Stop force and play. Holding Esc does the same.", "Stop force and play (or hold Esc)"
@@ -311,16 +311,16 @@ def test_the_wheel_over_a_choice_changes_nothing_and_a_label_has_its_name(qtbot:
 
 
 def test_a_table_shows_cells_shares_its_width_and_opens_a_row_by_enter(qtbot: Any) -> None:
-    asked: list[Any] = []
+    cells: list[Any] = []
 
     def cell(row: Any, name: str) -> dict[int, Any]:
-        asked.append((row, name))
+        cells.append((row, name))
         return {Qt.ItemDataRole.DisplayRole: f"{name} of {row}"}
 
     model = Rows({"a": "First", "b": "Second"}, cell)
-    table, opened = Table(model, ((1, 100), (3, 60)), "Sessions"), list[int]()
+    table, rows_opened = Table(model, ((1, 100), (3, 60)), "Sessions"), list[int]()
     qtbot.addWidget(table)
-    table.opened.connect(lambda index: opened.append(index.row()))
+    table.opened.connect(lambda index: rows_opened.append(index.row()))
     table.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     table.resize(360, 300)
     table.show()
@@ -333,7 +333,7 @@ def test_a_table_shows_cells_shares_its_width_and_opens_a_row_by_enter(qtbot: An
     assert (model.headerData(0, down), model.headerData(0, across, Qt.ItemDataRole.ToolTipRole)) == (None, None)
     assert [model.index(2, at).data() for at in (0, 1)] == ["a of z", "b of z"]
     assert model.index(2, 1).data(Qt.ItemDataRole.ToolTipRole) is None
-    assert len(asked) == len(set(asked)), "each cell is made once"
+    assert len(cells) == len(set(cells)), "each cell is made once"
     spare = table.viewport().width() - 160
     assert [table.columnWidth(at) for at in (0, 1)] == [100 + spare // 4, 60 + spare * 3 // 4]
     assert (table.minimumSizeHint().width(), table.accessibleName(), table.chosen_row) == (160, "Sessions", None)
@@ -341,7 +341,7 @@ def test_a_table_shows_cells_shares_its_width_and_opens_a_row_by_enter(qtbot: An
     qtbot.keyClick(table, Qt.Key.Key_Enter)
     qtbot.keyClick(table, Qt.Key.Key_Down)
     qtbot.keyClick(table, Qt.Key.Key_Return)
-    assert (opened, table.chosen_row, table.selectionModel().selectedRows()[0].row()) == ([1, 2], 2, 2)
+    assert (rows_opened, table.chosen_row, table.selectionModel().selectedRows()[0].row()) == ([1, 2], 2, 2)
     model.show("uv")
     assert (table.chosen_row, model.index(0, 0).data(), table.currentIndex()) == (None, "a of u", QModelIndex())
 

@@ -38,19 +38,19 @@ print(compiled.CACHE)
 
 
 def said_at_start(folder: Path, environment: dict[str, str], text: str = TWICE, *arguments: str) -> tuple[str, str]:
-    """Run a program whose file is in ``folder``; return what it printed, and what it logged."""
+    """Run a program whose file is in ``folder``; return its output and its log."""
     program = folder / "program.py"
     if not program.exists():  # its cache is that of its time of change
         program.write_text(text, encoding="utf-8", newline="\n")
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, str(program), *arguments],
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])} | environment,
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip(), done.stderr
+    assert process.returncode == 0, process.stderr
+    return process.stdout.strip(), process.stderr
 
 
 STEP = """
@@ -88,7 +88,7 @@ def test_a_step_is_code_for_its_callers_until_python_calls_it_also_from_the_cach
 
 @pytest.fixture
 def nowhere(tmp_path: Path) -> Path:
-    """Return a place that no folder can be made in, whoever asks: it is a file."""
+    """Return a path in which no user can create a folder, since it is a file."""
     file = tmp_path / "file"
     file.write_text("no folder", encoding="utf-8", newline="\n")
     return file / "cache"
@@ -108,7 +108,7 @@ def test_a_cache_that_cannot_be_written_is_kept_in_the_users_folder_with_a_word(
 
 @pytest.mark.slow
 @about_user_cache
-def test_where_nothing_can_be_kept_the_program_works_and_says_what_to_do(tmp_path: Path, nowhere: Path) -> None:
+def test_without_a_writable_cache_the_program_works_and_names_the_remedy(tmp_path: Path, nowhere: Path) -> None:
     at, said = said_at_start(tmp_path, {"NUMBA_CACHE_DIR": str(nowhere), "XDG_CACHE_HOME": str(nowhere)})
     assert at == "None"
     assert len(said.splitlines()) == 1
@@ -129,7 +129,7 @@ print(compiled.CACHE, hits)
 def started(package: Path, variables: dict[str, str], first: str = "") -> tuple[Path, int]:
     """Run ``first``, then let a copy of the package compute a length; return its cache and its loaded functions."""
     environment = os.environ | {"PYTHONPATH": str(package.parent), "PYTHONSAFEPATH": "1"} | variables
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", first + ADDS],
         env=environment,
         capture_output=True,
@@ -137,8 +137,8 @@ def started(package: Path, variables: dict[str, str], first: str = "") -> tuple[
         check=False,
         cwd=package.parent,
     )
-    assert done.returncode == 0, done.stderr
-    cache, hits = done.stdout.rsplit(maxsplit=1)
+    assert process.returncode == 0, process.stderr
+    cache, hits = process.stdout.rsplit(maxsplit=1)
     return Path(cache), int(hits)
 
 
@@ -159,13 +159,13 @@ def test_a_shipped_cache_is_used_only_if_sources_versions_and_processor_fit_and_
 ) -> None:
     monkeypatch.delenv("NUMBA_CPU_NAME", raising=False)
     package = copy_of_package(tmp_path / "a")
-    made, hits = started(package, {"NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(tmp_path / "made")})
+    cache, hits = started(package, {"NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(tmp_path / "made")})
     assert hits == 0
-    shipped = package / "compiled" / made.name
-    shutil.copytree(made, shipped)
+    shipped = package / "compiled" / cache.name
+    shutil.copytree(cache, shipped)
     (shipped / compiled.CHECKSUM).write_text(compiled.checksum_of(shipped), encoding="ascii", newline="\n")
 
-    assert started(package, {"NUMBA_CACHE_DIR": str(tmp_path / "fits")}) == (tmp_path / "fits" / made.name, 1)
+    assert started(package, {"NUMBA_CACHE_DIR": str(tmp_path / "fits")}) == (tmp_path / "fits" / cache.name, 1)
     host = {"NUMBA_CACHE_DIR": str(tmp_path / "fits"), "NUMBA_CPU_NAME": "host"}
     assert started(package, host)[1] == 0
     assert started(package, host)[1] == 1
@@ -232,8 +232,8 @@ def compiled_functions(tree: ast.Module) -> list[ast.FunctionDef]:
     ]
 
 
-def test_compiled_functions_freeze_only_what_the_digest_covers() -> None:
-    """Values are frozen into compiled functions, or into the constants of a module that they read."""
+def test_compiled_functions_freeze_only_sources_in_the_digest() -> None:
+    """Compiled functions freeze values, also through constants of a module that they read."""
     outside = set()
     for path in PACKAGE.rglob("*.py"):
         name = ".".join(path.relative_to(PACKAGE).with_suffix("").parts)

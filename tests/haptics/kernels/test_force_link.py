@@ -1,4 +1,4 @@
-"""The force link: how late, how unevenly and how seldom a force is sent, and that safety acts on what is sent."""
+"""The force link: delay, jitter and loss of sent forces; the safety layer acts on the sent force."""
 
 import numpy as np
 import pytest
@@ -21,20 +21,20 @@ TICKS = 3000
 
 def damper(damping_nspm=0.2, **link):
     """Return a scene of a linear damper with a force link."""
-    felt = Liquid(id="damper", density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=damping_nspm))
-    return Scene(liquids=(felt,), link=ForceLink(**link))
+    liquid = Liquid(id="damper", density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=damping_nspm))
+    return Scene(liquids=(liquid,), link=ForceLink(**link))
 
 
 def arrivals(ticks=TICKS, **link):
-    """Return of each tick which tick's force is sent, from 0; -1 where there is none."""
+    """Return, for each tick, the number of the tick whose force is sent, or -1 without a force."""
     model = pack(damper(**link))
-    force_n, found = np.zeros(3), []
+    force_n, sent_ticks = np.zeros(3), []
     for tick in range(ticks):
         force_n[:] = tick, -tick, 0.5
         arrived = delay_force(model.parameters[0].link, model.state[0].link, model.forces_n, force_n)
         assert arrived == bool(force_n[2])
-        found.append(int(force_n[0]) if arrived else -1)
-    return np.array(found)
+        sent_ticks.append(int(force_n[0]) if arrived else -1)
+    return np.array(sent_ticks)
 
 
 def sine(lasts_s=3.0, amplitude_m=0.02, hz=1.0):
@@ -46,7 +46,7 @@ def sine(lasts_s=3.0, amplitude_m=0.02, hz=1.0):
 
 @pytest.mark.parametrize("delay", [1, 15, 100, 200])
 def test_the_force_of_a_tick_is_sent_so_many_ticks_later(delay):
-    prompt, late = (samples_along(damper(delay_s=one / 1000), sine()) for one in (0, delay))
+    prompt, late = (samples_along(damper(delay_s=delay_ms / 1000), sine()) for delay_ms in (0, delay))
     np.testing.assert_array_equal(late.force_n, prompt.force_n)  # the force of the effects is recorded as it is
     begun = delay + 60  # the fade-in begins with the first force that arrives
     np.testing.assert_array_equal(late.device_force_n[begun:], prompt.device_force_n[begun - delay : -delay])
@@ -56,25 +56,25 @@ def test_the_force_of_a_tick_is_sent_so_many_ticks_later(delay):
 
 @pytest.mark.slow
 def test_a_link_that_does_nothing_leaves_every_bit_and_needs_no_memory():
-    for felt in EVERYTHING.values():
-        idle = felt.model_copy(update={"link": ForceLink(seed=5)})
-        one, other = Hand(felt), Hand(idle)
+    for each_scene in EVERYTHING.values():
+        idle = each_scene.model_copy(update={"link": ForceLink(seed=5)})
+        hand, idle_hand = Hand(each_scene), Hand(idle)
         for place in stroke(400):
-            assert one.tick(place).tobytes() == other.tick(place).tobytes()
+            assert hand.tick(place).tobytes() == idle_hand.tick(place).tobytes()
     assert len(pack(damper()).forces_n) == 0
 
 
 @pytest.mark.slow
-def test_jitter_is_uniform_and_no_older_force_follows_a_newer_one():
-    seen = arrivals(20_000, delay_s=0.02, jitter_s=0.05, seed=3)
-    ages = np.arange(len(seen)) - seen
-    assert (seen[:20] == -1).all()
-    assert (np.diff(seen) >= 0).all()
+def test_jitter_is_uniform_and_keeps_forces_in_order():
+    sent_ticks = arrivals(20_000, delay_s=0.02, jitter_s=0.05, seed=3)
+    ages = np.arange(len(sent_ticks)) - sent_ticks
+    assert (sent_ticks[:20] == -1).all()
+    assert (np.diff(sent_ticks) >= 0).all()
     assert ages[100:].min() == 20
     assert ages[100:].max() <= 20 + 50
     drawn = np.array([int(51 * uniform(3, 2 * tick + 1)) for tick in range(20_000)])
     due = np.arange(20_000) - 20 - drawn
-    np.testing.assert_array_equal(seen, np.maximum(np.maximum.accumulate(due), -1))
+    np.testing.assert_array_equal(sent_ticks, np.maximum(np.maximum.accumulate(due), -1))
     counts = np.bincount(drawn, minlength=51)
     assert ((counts - 20_000 / 51) ** 2 / (20_000 / 51)).sum() < 90  # chi-squared of 50 degrees of freedom, p 0.0005
 
@@ -82,10 +82,10 @@ def test_jitter_is_uniform_and_no_older_force_follows_a_newer_one():
 @pytest.mark.slow
 @pytest.mark.parametrize("loss", [0.1, 0.5])
 def test_a_lost_force_is_replaced_by_the_last_one(loss):
-    seen = arrivals(20_000, loss=loss, seed=9)
-    held = np.diff(seen) == 0
+    sent_ticks = arrivals(20_000, loss=loss, seed=9)
+    held = np.diff(sent_ticks) == 0
     assert held.mean() == pytest.approx(loss, abs=4 * np.sqrt(loss * (1 - loss) / 20_000))
-    assert (seen[1:][~held] == np.arange(1, 20_000)[~held]).all()
+    assert (sent_ticks[1:][~held] == np.arange(1, 20_000)[~held]).all()
     after = held[1:][held[:-1]].mean()  # losses do not come in bursts
     assert after == pytest.approx(loss, abs=5 * np.sqrt(loss * (1 - loss) / held.sum()))
 
@@ -107,9 +107,12 @@ def test_a_stop_is_zero_at_once_and_the_force_returns_with_a_fade():
 
 
 def test_the_first_force_that_arrives_fades_in():
-    """A force that stood at its full value after the fade of the scene would be a knock."""
-    felt = scene(liquid(4000, effects=("buoyancy",)), link=ForceLink(delay_s=0.15))
-    prompt, late = Hand(felt.model_copy(update={"link": PROMPT_LINK}), faded_in=False), Hand(felt, faded_in=False)
+    """A force at its full value after the scene has faded in would be a knock."""
+    delayed_scene = scene(liquid(4000, effects=("buoyancy",)), link=ForceLink(delay_s=0.15))
+    prompt, late = (
+        Hand(delayed_scene.model_copy(update={"link": PROMPT_LINK}), faded_in=False),
+        Hand(delayed_scene, faded_in=False),
+    )
     forces = np.array([[hand.tick((0.0, 0.0, 0.0)).device_force_n[1] for _ in range(900)] for hand in (prompt, late)])
     assert forces[0, -1] > 1
     assert not forces[1, :150].any()
@@ -119,7 +122,7 @@ def test_the_first_force_that_arrives_fades_in():
 
 @pytest.mark.slow
 def test_a_body_that_bobs_through_a_surface_gets_no_energy_from_late_buoyancy():
-    """Buoyancy near the surface is a spring; a late spring drives the hand, and the observer must see that."""
+    """Buoyancy near the surface acts as a spring; a late spring drives the hand, which the observer must detect."""
     pool = Liquid(
         id="pool",
         density_kg_m3=2000,
@@ -140,7 +143,7 @@ def test_a_body_that_bobs_through_a_surface_gets_no_energy_from_late_buoyancy():
 
 
 def balance(hand, places):
-    """Return the lowest energy [J] that hand and liquid owe each other, the strongest force and the longest step."""
+    """Return the lowest energy balance [J] of hand and liquid, the strongest force and the longest step."""
     energy_j = lowest_j = strongest_n = longest_m = 0.0
     before_m, force_n = places[0], np.zeros(3)
     for place in places:
@@ -155,7 +158,7 @@ def balance(hand, places):
 @pytest.mark.slow
 @pytest.mark.parametrize("link", [{"delay_s": 0.1}, {"delay_s": 0.2, "jitter_s": 0.05, "loss": 0.3}])
 def test_a_late_force_gives_no_more_than_the_allowance_however_long_it_lasts(link):
-    """A debt of 1 mJ that is forgiven at 1 mW would grow by 15 mJ."""
+    """A debt of 1 mJ, forgiven at 1 mW, would grow by 15 mJ."""
     t_s = np.arange(15_000) / 1000
     places = np.outer(0.02 * np.sin(2 * np.pi * 2.5 * t_s), (1.0, 0.0, 0.0))
     lowest_j, strongest_n, longest_m = balance(Hand(damper(8.0, **link)), places)
@@ -164,7 +167,7 @@ def test_a_late_force_gives_no_more_than_the_allowance_however_long_it_lasts(lin
 
 
 @pytest.mark.slow
-def test_the_gain_comes_back_with_the_next_scene_alone():
+def test_the_gain_returns_only_with_the_next_scene():
     t_s = np.arange(3000) / 1000
     hand = Hand(damper(8.0, delay_s=0.1))
     for place in np.outer(0.02 * np.sin(2 * np.pi * 2.5 * t_s), (1.0, 0.0, 0.0)):
@@ -178,15 +181,15 @@ def test_the_gain_comes_back_with_the_next_scene_alone():
     assert hand.safety[0].passivity.gain == 1
 
 
-def test_a_link_survives_a_change_of_numbers_and_is_no_number_of_the_scene():
-    felt = damper(delay_s=0.02, seed=4)
-    assert override_value(felt, "damping_nspm", 3.0).link == felt.link
-    assert not {"delay_s", "jitter_s", "loss", "seed"} & set(number_names(felt))
+def test_a_link_survives_overrides_and_is_not_a_scene_parameter():
+    linked_scene = damper(delay_s=0.02, seed=4)
+    assert override_value(linked_scene, "damping_nspm", 3.0).link == linked_scene.link
+    assert not {"delay_s", "jitter_s", "loss", "seed"} & set(number_names(linked_scene))
     with pytest.raises(StudyError, match="the parameter 'link'"):
-        override_value(felt, "link", "{delay_s=0.1}")
-    assert "link" not in scene_text(felt)
-    assert is_built_alike(felt, override_value(felt, "damping_nspm", 3.0))
-    assert not is_built_alike(felt, damper(delay_s=0.03, seed=4))
+        override_value(linked_scene, "link", "{delay_s=0.1}")
+    assert "link" not in scene_text(linked_scene)
+    assert is_built_alike(linked_scene, override_value(linked_scene, "damping_nspm", 3.0))
+    assert not is_built_alike(linked_scene, damper(delay_s=0.03, seed=4))
 
 
 def test_delay_and_jitter_beyond_the_kept_forces_are_refused():

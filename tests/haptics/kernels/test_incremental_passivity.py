@@ -1,4 +1,4 @@
-"""The incremental passivity observer: what is fast in force and motion, and the gain that follows from its work."""
+"""The incremental passivity observer: the fast parts of force and motion, their work, and the resulting gain."""
 
 import numpy as np
 import pytest
@@ -19,15 +19,15 @@ from tests.haptics.scenes import HONEY, Hand
 
 
 def balances(force_n, velocity_mps, period_s=1e-3):
-    """Return the balance [J] after each of some samples along one axis."""
+    """Return the balance [J] after each sample of a motion along one axis."""
     fast = records(PASSIVITY, 1)[0].fast
     begin_incremental(fast)
-    found = []
+    balances_j = []
     for one_n, one_mps in zip(force_n, velocity_mps, strict=True):
         observe_incremental(fast, 1, one_n, one_mps, period_s)
         close_incremental(fast, period_s)
-        found.append(fast.balance_j)
-    return np.array(found)
+        balances_j.append(fast.balance_j)
+    return np.array(balances_j)
 
 
 @pytest.mark.parametrize("frequency_hz", [30.0, 60.0])
@@ -36,22 +36,22 @@ def test_a_force_along_a_fast_motion_owes_the_filtered_power(frequency_hz, perio
     t_s = np.arange(0, 1, period_s)
     omega = 2 * np.pi * frequency_hz
     wave = np.sin(omega * t_s)
-    found = balances(2.0 * wave, 0.1 * wave, period_s)
+    balances_j = balances(2.0 * wave, 0.1 * wave, period_s)
     kept, tick = np.exp(-CORNER_RADPS * period_s), np.exp(-1j * omega * period_s)
     passed = np.abs(kept * (1 - tick) / (1 - kept * tick)) ** 4
-    power_w = (found[len(t_s) // 2] - found[-1]) / 0.5
+    power_w = (balances_j[len(t_s) // 2] - balances_j[-1]) / 0.5
     assert power_w == pytest.approx(0.5 * 2.0 * 0.1 * passed - INCREMENTAL_FORGIVEN_W, rel=0.02)
 
 
-def test_a_damper_owes_nothing_and_what_it_took_is_not_kept():
+def test_a_damper_owes_nothing_and_earns_no_credit():
     wave = np.sin(2 * np.pi * 40 * np.arange(1000) * 1e-3)
-    found = balances(np.where(np.arange(1000) < 500, -2.0, 2.0) * wave, 0.1 * wave)
-    assert found[:490].min() > -1e-4
-    assert found[-1] < -INCREMENTAL_ALLOWANCE_J
+    balances_j = balances(np.where(np.arange(1000) < 500, -2.0, 2.0) * wave, 0.1 * wave)
+    assert balances_j[:490].min() > -1e-4
+    assert balances_j[-1] < -INCREMENTAL_ALLOWANCE_J
 
 
 def test_a_swing_is_owed_for_although_the_motion_pays_more():
-    """Over a swing at 40 Hz on a motion of 2 Hz the whole force takes energy; its fast part gives some."""
+    """Over a 40 Hz oscillation on a motion of 2 Hz the whole force dissipates energy, but its fast part adds some."""
     t_s = np.arange(1000) * 1e-3
     slow, fast = 0.3 * np.sin(2 * np.pi * 2 * t_s), 0.05 * np.sin(2 * np.pi * 40 * t_s)
     force_n, velocity_mps = -20 * slow + 20 * fast, slow + fast

@@ -48,7 +48,7 @@ def literal_mps2(places_m, speeds_mps, asked_n, sent_n, delay, others_n, surpris
         integrals[1] += T * integrals[0]
         return value
 
-    found = []
+    accelerations = []
     for k, place in enumerate(places_m):
         force = fast(late, sent_n[k - 1 - delay] if k > delay else np.zeros(3))
         fast(ahead, sent_n[k - 1] if k else np.zeros(3))
@@ -64,17 +64,17 @@ def literal_mps2(places_m, speeds_mps, asked_n, sent_n, delay, others_n, surpris
         theta = min(max(learned + (7.0 - learned) * T / 2.0, 0.5), 10.0)
         spread = min(spread - spread**2 * (s @ s) / d + 10.0 * T, 25.0)
         ahead_s = 0.4 * (delay + 0.5) * T
-        asked = asked_n[k - 1] if k else np.zeros(3)
+        requested_n = asked_n[k - 1] if k else np.zeros(3)
         if surprises[k] > 1.5:
             x, r, theta, spread = np.zeros((3, 4)), np.zeros((3, 4)), 7.0, 4.0
-            x[:, 0], x[:, 1], asked = place, speeds_mps[k], sent_n[k - 1]
+            x[:, 0], x[:, 1], requested_n = place, speeds_mps[k], sent_n[k - 1]
             p = np.diag([COUNT_M**2 / 2, 0.01**2, 1.0, 100.0])
-        base = (sent_n[k - 1] if k else np.zeros(3)) - asked
+        base = (sent_n[k - 1] if k else np.zeros(3)) - requested_n
         slow = 2 * zeta * omega * ahead[0] + omega**2 * ahead[1]
         known = x[:, 2] + ahead_s * x[:, 3] + theta * (r[:, 2] + ahead_s * r[:, 3] + direct * (base - slow))
         own = 3 * theta * direct  # dw/dt in the scene, of scale 3, by 1 N
-        found.append((3 * known + own * others_n[k]) / (1 + own * MASS_KG))
-    return np.array(found)
+        accelerations.append((3 * known + own * others_n[k]) / (1 + own * MASS_KG))
+    return np.array(accelerations)
 
 
 @pytest.mark.parametrize("delay", [0, 1, 4])
@@ -83,7 +83,7 @@ def test_the_acceleration_is_its_definition_and_the_force_solves_its_equation(de
     hand = Hand(WATER, dynamics=Dynamics(delay_s=delay * T, count_m=COUNT_M, mass_kg=0.1))
     hand.safety[0].delay_ticks = delay
     rows = {name: [] for name in ("places_m", "speeds_mps", "asked_n", "sent_n", "others_n", "surprises")}
-    found, acts, speed, place = [], [], np.zeros(3), np.zeros(3)
+    accelerations, acts, speed, place = [], [], np.zeros(3), np.zeros(3)
     for k in range(1500):
         speed = 0.99 * speed + random.normal(0, 0.01 if 200 < k < 210 else 0.002 if k < 210 else 2e-4, 3)
         place = place + T * speed
@@ -92,7 +92,7 @@ def test_the_acceleration_is_its_definition_and_the_force_solves_its_equation(de
         assert state.kalman.on_ewma == 0
         inertia_n = np.array(local.inertia_n[0])
         assert inertia_n == pytest.approx(-MASS_KG * np.array(local.added_mass.acceleration_mps2))
-        found.append(np.array(local.added_mass.acceleration_mps2))
+        accelerations.append(np.array(local.added_mass.acceleration_mps2))
         acts.append(float(state.kalman.trust) > 0)
         trust = max(float(state.kalman.trust), 0.0)
         share = float(hand.model.liquids[0].inertia_share[delay])
@@ -108,7 +108,7 @@ def test_the_acceleration_is_its_definition_and_the_force_solves_its_equation(de
             rows[name].append(np.array(values))
     expected = literal_mps2(delay=delay, **{name: np.array(values) for name, values in rows.items()})
     acts, surprises = np.array(acts), np.flatnonzero(np.array(rows["surprises"]) > 1.5)
-    assert np.array(found)[acts] == pytest.approx(expected[acts], abs=1e-6 * np.abs(expected).max())
+    assert np.array(accelerations)[acts] == pytest.approx(expected[acts], abs=1e-6 * np.abs(expected).max())
     assert np.abs(expected[acts]).max() > 5
     assert 10 < len(surprises) < 100
     unused = {tick + later for tick in surprises for later in range(50)}  # 50 ms after each
@@ -123,9 +123,9 @@ def acting_error(name, delay, *, hz=1.6, rules=CURRENT):
     bench = Bench(case, scene=scene, dynamics=dynamics, rules=rules)
     trace = bench.follow(sine_path(0.02, 2 * math.pi * hz, 4.0, 1000.0))
     law_n = law_along(scene, trace)
-    counted = trace.t_s[:-1] >= 1.5
-    mean_n = 0.5 * (law_n[:-1] + law_n[1:])[counted]
-    return math.sqrt(np.sum((trace.acting_n[:-1][counted] - mean_n) ** 2) / np.sum(mean_n**2))
+    settled = trace.t_s[:-1] >= 1.5
+    mean_n = 0.5 * (law_n[:-1] + law_n[1:])[settled]
+    return math.sqrt(np.sum((trace.acting_n[:-1][settled] - mean_n) ** 2) / np.sum(mean_n**2))
 
 
 @compiled
@@ -141,7 +141,7 @@ def acting_error(name, delay, *, hz=1.6, rules=CURRENT):
     ],
 )
 def test_the_force_acts_at_every_delay(name, most, fast):
-    """By the rules before, four ticks took most of the inertia, and quick strokes felt twice as viscous at one."""
+    """Under earlier rules, four ticks removed most inertia, and one tick doubled the viscosity of quick strokes."""
     for delay in (1, 2, 3, 4):
         assert acting_error(f"physical2_{name}", delay) < most
         assert acting_error(f"physical2_{name}", delay, hz=3.0) < fast
@@ -159,8 +159,8 @@ def test_quick_strokes_in_thick_liquids_keep_their_resistance():
         scene = without_buoyancy(scene_of(case))
         bench = Bench(case, scene=scene, dynamics=Dynamics(delay_s=T, count_m=COUNT_M, mass_kg=0.1), rules=rules)
         trace = bench.follow(sine_path(0.02, 6 * math.pi, 4.0, 1000.0))
-        counted, velocity_mps = trace.t_s >= 1.5, trace.velocity_mps
-        acting, law = (np.sum((f_n * velocity_mps)[counted]) for f_n in (trace.acting_n, law_along(scene, trace)))
+        settled, velocity_mps = trace.t_s >= 1.5, trace.velocity_mps
+        acting, law = (np.sum((f_n * velocity_mps)[settled]) for f_n in (trace.acting_n, law_along(scene, trace)))
         return acting / law
 
     assert 0.88 < resistance(CURRENT) < 1.0
@@ -193,7 +193,7 @@ def test_the_slope_limit_grows_with_the_inertia_up_to_that_of_one_tick():
     ],
     ids=["light handle", "honey at a scale", "scale", "rate", "tar", "link", "history", "elastic", "no inertia"],
 )
-def test_what_is_not_stable_with_the_known_force_keeps_its_limits(name, fields):
+def test_scenes_unstable_with_the_known_force_keep_their_limits(name, fields):
     assert factors(name, **fields) == [0.0] * 5
 
 
@@ -208,7 +208,7 @@ def test_the_filter_of_the_known_force_runs_only_if_a_liquid_needs_it():
 
 
 def test_after_a_fault_the_inertial_force_goes_on_smoothed():
-    """A hand that accelerates by 2 m/s²; a change of the delay is a fault."""
+    """The hand accelerates by 2 m/s²; a change of the delay counts as a fault."""
     hand = Hand(WATER, dynamics=Dynamics(delay_s=T, count_m=0.0, mass_kg=0.1))
     hand.safety[0].delay_ticks = 3
     for k in range(200):
@@ -248,7 +248,7 @@ def test_in_reversals_of_more_than_15_mps2_the_limit_applies(amplitude_m, is_lim
     assert local.inertia_share == 1.0
 
 
-def release(name, delay, mass_kg, phase):
+def released_hand(name, delay, mass_kg, phase):
     """Return gain and speed 1 s after a release in a stroke of 2 Hz ±30 mm, and the energy given to the handle."""
     case = Case(
         liquid=name,
@@ -277,10 +277,10 @@ def release(name, delay, mass_kg, phase):
 @pytest.mark.parametrize("name", ["glycerin", "honey"])
 @pytest.mark.parametrize("delay", [1, 2, 3, 4])
 def test_a_handle_let_go_in_a_stroke_stops_and_the_liquid_remains(name, delay):
-    """Unless forgiven, the debt of the late inertial force took most of the liquid's force for seconds."""
+    """Unless forgiven, the debt of the late inertial force would remove most of the liquid's force for seconds."""
     for mass_kg in (0.1, 0.2, 0.5):
         for phase in (0.04, 0.23, 0.41):
-            gain, speed_mps, given_j = release(f"physical2_{name}", delay, mass_kg, phase)
+            gain, speed_mps, given_j = released_hand(f"physical2_{name}", delay, mass_kg, phase)
             assert gain >= 0.9
             assert speed_mps < 0.05
             assert given_j <= 10e-3

@@ -1,4 +1,4 @@
-"""The force that acted on the hand, logged for the observer."""
+"""The log of the force that acted on the hand, which the observer reads."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from study_app.haptics.model.layout import PASSIVITY, records
 
 
 @pytest.mark.parametrize("row", [0, 3, -1])
-def test_the_force_on_the_hand_is_logged_in_its_row_alone_without_buoyancy(row: int) -> None:
+def test_the_force_on_the_hand_is_logged_once_without_buoyancy(row: int) -> None:
     passivity = records(PASSIVITY, 1)[0]
     passivity.row = range(len(passivity.acted_n))[row]
     passivity.lift_n = (0.25, -0.5, 4.0)

@@ -21,13 +21,13 @@ STOKES_LAYER_KG = 3 * np.pi * 0.034**2 * np.sqrt(2 * 10.0 * 1400 / (2 * np.pi * 
 SCENES = {**THESIS, "strong": STRONG}
 
 
-def passivity(hand):
+def passivity_controller(hand):
     """Return the passivity controller of a hand's servo."""
     return hand.safety[0].passivity
 
 
 def storage_j(hand, sent_n, share=1 / 3, *, clamped=1.0):
-    """Return what the velocity filter of a hand in a liquid at rest can give back [J at the hand], by the closed form.
+    """Return the energy that the velocity filter can return in a liquid at rest [J at the hand], by the closed form.
 
     ``sent_n`` is the force before the last sample, ``clamped`` the share of it that the force limit left; 9 ms is the
     mean delay of the thesis' filter.
@@ -36,16 +36,16 @@ def storage_j(hand, sent_n, share=1 / 3, *, clamped=1.0):
     return (1 - (1 - share) * clamped ** (1 / (1 / share - 1))) * 9e-3 * power_w
 
 
-def test_a_filtered_damper_gives_back_what_its_filter_stores_and_no_more():
-    """A hand that stops within a tick gets back ∫F(v̂) dt v = K τ F v̂ at most; K as the storage has it."""
+def test_a_filtered_damper_returns_exactly_the_energy_that_its_filter_stores():
+    """A hand that stops within a tick gets back at most ∫F(v̂) dt v = K τ F v̂, with the storage's K."""
     for viscous, share in ((False, 1 / 3), (True, 1 / 2)):
         drag = {"viscosity_pa_s": 20.0, "drag": {"law": "schiller-naumann"}} if viscous else {}
         hand = Hand(scene(liquid(1000 if not viscous else 1.0, **drag), scale=1))
         hand.sweep(0.2, 300)
         sent_n = hand.sample[0].device_force_n.copy()
-        passivity(hand).balance_j = 10.0
+        passivity_controller(hand).balance_j = 10.0
         hand.tick((0.2 * 0.301, 0.0, 0.0))
-        stored_j = passivity(hand).balance_j
+        stored_j = passivity_controller(hand).balance_j
         assert stored_j == pytest.approx(storage_j(hand, sent_n, share), rel=1e-6)
         # v = v̂ + τ dv̂/dt: what F(v̂) takes beyond ∫F v̂ dt while v̂ rises from 0 is the storage
         speeds = np.linspace(0.0, hand.model.state[0].estimate_mps[0], 1001)
@@ -59,36 +59,36 @@ def test_the_balance_is_the_work_of_the_force_really_sent_over_the_steps_of_the_
     places = np.array([[0.03 * np.cos(9 * t), 0.0, 0.03 * np.sin(9 * t)] for t in np.arange(0, 1, 1e-3)])
     balance_j, sent = 0.0, np.zeros(3)
     for k, place in enumerate(places):
-        clamped = passivity(hand).norm_share
+        clamped = passivity_controller(hand).norm_share
         sample = hand.tick(place)
         if k > 0:
             balance_j = min(balance_j - sent @ (place - places[k - 1]), storage_j(hand, sent, clamped=clamped))
-        assert passivity(hand).balance_j == pytest.approx(balance_j, abs=1e-15)
+        assert passivity_controller(hand).balance_j == pytest.approx(balance_j, abs=1e-15)
         sent = sample.device_force_n.copy()
 
 
 def test_over_a_gap_the_mean_of_the_forces_sent_meanwhile_counts():
     hand = Hand(HONEY, faded_in=False)
     hand.sweep(0.2, 100)
-    passivity(hand).balance_j = 0.0
+    passivity_controller(hand).balance_j = 0.0
     forces = [hand.tick((0.02, 0.0, 0.0)).device_force_n.copy()]
     forces += [hand.tick(None).device_force_n.copy() for _ in range(3)]
     hand.tick((0.0195, 0.0, 0.0))
-    assert passivity(hand).balance_j == pytest.approx(-np.mean(forces, axis=0)[0] * -0.0005)
-    assert passivity(hand).balance_j < 0
+    assert passivity_controller(hand).balance_j == pytest.approx(-np.mean(forces, axis=0)[0] * -0.0005)
+    assert passivity_controller(hand).balance_j < 0
 
 
 @pytest.mark.compiled
-def test_what_a_wake_can_return_is_four_27ths_of_c_u_cubed_over_its_length():
+def test_a_wake_can_return_four_27ths_of_c_u_cubed_over_its_length():
     hand = Hand(WATER)
     hand.sweep(0.3, 1000)
-    passivity(hand).balance_j = 1.0
+    passivity_controller(hand).balance_j = 1.0
     sent_n = hand.sample[0].device_force_n.copy()
     sample = hand.tick((0.3, 0.0, 0.0))
     u = np.linalg.norm(sample.wake_mps)
     reserve_j = 4 / 27 * 0.5 * 1000 * 0.47 * np.pi * 0.034**2 * u**3 * 1.7 / 10
     assert reserve_j > 0.1
-    assert passivity(hand).balance_j == pytest.approx(reserve_j + storage_j(hand, sent_n), rel=1e-9)
+    assert passivity_controller(hand).balance_j == pytest.approx(reserve_j + storage_j(hand, sent_n), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -99,28 +99,32 @@ def test_what_a_wake_can_return_is_four_27ths_of_c_u_cubed_over_its_length():
         (("added_mass", "history"), 0.5 * RHO_V + STOKES_LAYER_KG),
     ],
 )
-def test_what_moving_liquid_can_return_is_its_kinetic_energy(effects, inertia_kg):
+def test_moving_liquid_can_return_its_kinetic_energy(effects, inertia_kg):
     hand = Hand(scene(liquid(1400, viscosity_pa_s=10.0, effects=("drag", *effects)), scale=3))
     hand.sweep(0.3, 300)
-    passivity(hand).balance_j = 10.0
+    passivity_controller(hand).balance_j = 10.0
     sent_n = hand.sample[0].device_force_n.copy()
     v = hand.tick((0.09, 0.0, 0.0)).velocity_mps[0]
-    assert passivity(hand).balance_j == pytest.approx(0.5 * inertia_kg * v**2 / 3 + storage_j(hand, sent_n), rel=1e-9)
+    assert passivity_controller(hand).balance_j == pytest.approx(
+        0.5 * inertia_kg * v**2 / 3 + storage_j(hand, sent_n), rel=1e-9
+    )
 
 
 def test_a_wake_of_a_viscous_liquid_returns_a_quarter_of_its_resistance():
     viscous = liquid(1400, viscosity_pa_s=10.0, wake={"length": 500, "scaling": 600}, drag={"law": "brown-lawler"})
     hand = Hand(scene(viscous, scale=3))
     hand.sweep(0.1, 300)
-    passivity(hand).balance_j = 10.0
+    passivity_controller(hand).balance_j = 10.0
     sent_n = hand.sample[0].device_force_n.copy()
     u = np.linalg.norm(hand.tick((0.03, 0.0, 0.0)).wake_mps)
     resistance_nspm = 3 * np.pi * 10 * 0.068 * laws.brown_lawler(1400 * u * 0.068 / 10)
     wake_j = 0.25 * resistance_nspm * u**2 * 0.5 / 3
-    assert passivity(hand).balance_j == pytest.approx(wake_j + storage_j(hand, sent_n, share=1 / 2), rel=1e-9)
+    assert passivity_controller(hand).balance_j == pytest.approx(
+        wake_j + storage_j(hand, sent_n, share=1 / 2), rel=1e-9
+    )
 
 
-def test_the_reserve_is_that_of_the_last_sample_though_samples_were_lost():
+def test_the_reserve_follows_the_last_sample_despite_lost_samples():
     hand = Hand(HONEY)
     hand.safety[0].delay_ticks = 0
     hand.sweep(0.2, 300)
@@ -128,9 +132,11 @@ def test_the_reserve_is_that_of_the_last_sample_though_samples_were_lost():
         hand.tick(None)
     for k in range(1, 12):
         hand.tick((0.06 + 1e-5 * k, 0.0, 0.0))
-    assert passivity(hand).stored_j.max() < 0.1 * storage_j(hand, (-8.0, 0.0, 0.0))
-    newest = [passivity(hand).stored_j[passivity(hand).row - before] for before in (1, 2)]  # late by a tick at least
-    assert passivity(hand).reserve_j == pytest.approx(max(newest), rel=1e-9)
+    assert passivity_controller(hand).stored_j.max() < 0.1 * storage_j(hand, (-8.0, 0.0, 0.0))
+    newest = [
+        passivity_controller(hand).stored_j[passivity_controller(hand).row - before] for before in (1, 2)
+    ]  # late by a tick at least
+    assert passivity_controller(hand).reserve_j == pytest.approx(max(newest), rel=1e-9)
 
 
 def test_buoyancy_only_lends():
@@ -139,7 +145,7 @@ def test_buoyancy_only_lends():
     for k in range(1, 500):
         sample = hand.tick((0.0, 1e-4 * k, 0.0))
     assert sample.device_force_n[1] > 1.0
-    assert passivity(hand).balance_j == pytest.approx(0.0, abs=1e-12)
+    assert passivity_controller(hand).balance_j == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.compiled
@@ -150,11 +156,11 @@ def test_a_hand_that_drifts_with_a_current_does_no_work():
     assert held[-1].device_force_n[0] > 0.5
     hand.sweep(0.1, 300)
     assert not any(hand.tick((0.03 + 2e-5 * k, 0.0, 0.0)).limiters & LIMITER_ENERGY for k in range(500))
-    assert passivity(hand).balance_j <= 0.2e-3
+    assert passivity_controller(hand).balance_j <= 0.2e-3
 
 
-def pushed():
-    """Return a hand at rest after a stroke, 18 cm along, whose wake pushes it on."""
+def pushed_hand():
+    """Return a hand at rest 18 cm along a stroke, which its wake pushes on."""
     hand = Hand(WATER)
     hand.sweep(0.3, 600)
     for _ in range(60):
@@ -164,30 +170,30 @@ def pushed():
 
 
 @pytest.mark.parametrize("debt_j", [2e-6, 0.1e-3, 1e-3])
-def test_a_debt_is_paid_by_damping_past_the_slew_limit_within_what_the_loop_bears(debt_j):
-    hand = pushed()
+def test_a_debt_is_paid_by_damping_beyond_the_slew_limit_within_the_stable_range(debt_j):
+    hand = pushed_hand()
     for k in range(20):
         hand.tick((0.18 + 6e-5 * k, 0.0, 0.0))
-    passivity(hand).balance_j = -1e-3 - debt_j
-    passivity(hand).strongest_n, passivity(hand).longest_m = 8.0, 0.01
+    passivity_controller(hand).balance_j = -1e-3 - debt_j
+    passivity_controller(hand).strongest_n, passivity_controller(hand).longest_m = 8.0, 0.01
     sent_n = hand.tick((0.18 + 6e-5 * 20, 0.0, 0.0)).device_force_n[0]
     assert hand.sample[0].limiters & LIMITER_ENERGY
-    owed_j = -1e-3 - min(passivity(hand).balance_j, passivity(hand).late_balance_j)
-    v = passivity(hand).velocity_mps[0]
+    owed_j = -1e-3 - min(passivity_controller(hand).balance_j, passivity_controller(hand).late_balance_j)
+    v = passivity_controller(hand).velocity_mps[0]
     assert v == pytest.approx(0.06, rel=1e-3)
-    assert passivity(hand).gain == pytest.approx(0.125e-3 / (0.125e-3 + owed_j))
-    brake_n = min(owed_j / (1e-3 * v), 0.5 * passivity(hand).gain * 53 * v)
+    assert passivity_controller(hand).gain == pytest.approx(0.125e-3 / (0.125e-3 + owed_j))
+    brake_n = min(owed_j / (1e-3 * v), 0.5 * passivity_controller(hand).gain * 53 * v)
     slewed_n = hand.safety[0].slewed_n[0]
     assert slewed_n > 0
     assert sent_n == pytest.approx(slewed_n - (v / 0.04 - 1) * (slewed_n + brake_n), rel=1e-6)
 
 
-def test_a_brake_is_let_go_and_told_even_where_a_scene_begins_in_between():
-    hand = pushed()
+def test_a_brake_is_released_and_reported_even_if_a_scene_begins_meanwhile():
+    hand = pushed_hand()
     for k in range(20):
         hand.tick((0.18 + 1e-4 * k, 0.0, 0.0))
-    passivity(hand).balance_j = -1.1e-3
-    passivity(hand).strongest_n, passivity(hand).longest_m = 8.0, 0.01
+    passivity_controller(hand).balance_j = -1.1e-3
+    passivity_controller(hand).strongest_n, passivity_controller(hand).longest_m = 8.0, 0.01
     braked_n = hand.tick((0.18 + 1e-4 * 20, 0.0, 0.0)).device_force_n[0]
     assert hand.safety[0].slewed_n[0] - braked_n > 0.5
     begin_scene(hand.safety[0])
@@ -197,15 +203,15 @@ def test_a_brake_is_let_go_and_told_even_where_a_scene_begins_in_between():
     assert hand.tick((0.18 + 1e-4 * 22, 0.0, 0.0)).limiters & LIMITER_ENERGY == 0
 
 
-def test_what_is_left_is_not_spent_within_10_ms():
-    hand = pushed()
+def test_the_remaining_energy_is_not_spent_within_10_ms():
+    hand = pushed_hand()
     for k in range(20):
         hand.tick((0.18 + 1e-4 * k, 0.0, 0.0))
-    passivity(hand).balance_j = passivity(hand).late_balance_j = -0.95e-3
+    passivity_controller(hand).balance_j = passivity_controller(hand).late_balance_j = -0.95e-3
     sent_n = hand.tick((0.18 + 1e-4 * 20, 0.0, 0.0)).device_force_n[0]
-    left_j = 1e-3 + min(passivity(hand).balance_j, passivity(hand).late_balance_j)
+    left_j = 1e-3 + min(passivity_controller(hand).balance_j, passivity_controller(hand).late_balance_j)
     assert left_j > 0
-    assert sent_n == pytest.approx(left_j / (0.02 * passivity(hand).velocity_mps[0]), rel=1e-6)
+    assert sent_n == pytest.approx(left_j / (0.02 * passivity_controller(hand).velocity_mps[0]), rel=1e-6)
 
 
 @pytest.mark.slow
@@ -213,10 +219,10 @@ def test_what_is_left_is_not_spent_within_10_ms():
 def test_a_swinging_loop_keeps_a_low_gain_for_seconds():
     hand = Hand(HONEY)
     whole_n = hand.sweep(0.05, 100)[-1].device_force_n[0]
-    passivity(hand).balance_j = -1e-3 - 0.375e-3
-    passivity(hand).strongest_n, passivity(hand).longest_m = 8.0, 0.01
+    passivity_controller(hand).balance_j = -1e-3 - 0.375e-3
+    passivity_controller(hand).strongest_n, passivity_controller(hand).longest_m = 8.0, 0.01
     hand.tick((0.005 + 5e-5, 0.0, 0.0))
-    passivity(hand).balance_j = passivity(hand).late_balance_j = 0.0
+    passivity_controller(hand).balance_j = passivity_controller(hand).late_balance_j = 0.0
     shares = [hand.tick((0.005 + 5e-5 * k, 0.0, 0.0)).device_force_n[0] / whole_n for k in range(2, 2502)]
     assert shares[10] == pytest.approx(0.25, rel=0.05)
     assert shares[1400] == pytest.approx(0.5, rel=0.05)
@@ -233,13 +239,13 @@ def test_a_force_that_acts_late_is_counted_late():
             late_n = sent[k - 4] if k >= 4 else 0.0
             balance_j = min(balance_j + 1e-6, -1e-3) if balance_j < -1e-3 else balance_j
             balance_j -= late_n * (place - places[k - 1])
-        clamped, before_n = passivity(hand).norm_share, (sent[k - 1] if k else 0.0, 0.0, 0.0)
-        gain = passivity(hand).gain  # this fast, a loop with such a delay is observed to swing
+        clamped, before_n = passivity_controller(hand).norm_share, (sent[k - 1] if k else 0.0, 0.0, 0.0)
+        gain = passivity_controller(hand).gain  # this fast, a loop with such a delay is observed to swing
         sent.append(hand.tick((place, 0.0, 0.0)).device_force_n[0])
         stored.append(gain * storage_j(hand, before_n, clamped=clamped))
         balance_j = min(balance_j, max(stored[k], stored[max(k - 3, 0)]))
-        assert passivity(hand).late_balance_j == pytest.approx(balance_j, abs=1e-12)
-    assert passivity(hand).late_balance_j < passivity(hand).balance_j
+        assert passivity_controller(hand).late_balance_j == pytest.approx(balance_j, abs=1e-12)
+    assert passivity_controller(hand).late_balance_j < passivity_controller(hand).balance_j
 
 
 def test_a_loop_that_is_believed_not_to_be_late_is_counted_as_one_that_is_late_by_a_tick():
@@ -248,20 +254,22 @@ def test_a_loop_that_is_believed_not_to_be_late_is_counted_as_one_that_is_late_b
         hand.safety[0].delay_ticks = believed
         for t in np.arange(0, 0.1, 1e-3):
             hand.tick((0.005 * np.cos(200 * t), 0.0, 0.0))
-    late, later = ([getattr(passivity(hand), name) for hand in hands] for name in ("late_balance_j", "later_balance_j"))
+    late, later = (
+        [getattr(passivity_controller(hand), name) for hand in hands] for name in ("late_balance_j", "later_balance_j")
+    )
     assert late[0] == late[1] > later[0] == later[1]
-    assert late[0] < passivity(hands[0]).balance_j
+    assert late[0] < passivity_controller(hands[0]).balance_j
 
 
 def test_a_liquid_that_resists_enough_pays_its_debt_unchanged():
     hand = Hand(HONEY)
-    felt = hand.sweep(0.2, 300)[-1].force_n[0]
-    passivity(hand).balance_j = -1e-3 + 0.0002 * felt * 0.999
+    honey_n = hand.sweep(0.2, 300)[-1].force_n[0]
+    passivity_controller(hand).balance_j = -1e-3 + 0.0002 * honey_n * 0.999
     sample = hand.tick((0.0602, 0.0, 0.0))
     assert sample.device_force_n[0] == sample.force_n[0]
     assert sample.limiters == 0
     hand.tick((0.0604, 0.0, 0.0))
-    assert passivity(hand).balance_j > -1e-3
+    assert passivity_controller(hand).balance_j > -1e-3
 
 
 @pytest.mark.compiled
@@ -269,26 +277,26 @@ def test_a_liquid_that_resists_enough_pays_its_debt_unchanged():
 @pytest.mark.parametrize("speed_mps", [0.05, 0.1, 0.2, 0.3] if COMPILED else [0.3])
 @pytest.mark.parametrize("motion", ["reach", "circle", "stop"])
 def test_it_never_acts_where_people_move_as_they_do(name, speed_mps, motion):
-    felt = THESIS[name]
-    scene_mps = felt.scale * speed_mps
+    scene = THESIS[name]
+    scene_mps = scene.scale * speed_mps
     shape = {
         "reach": {"distance_m": 0.6, "reach_s": 1.875 * 0.6 / scene_mps},
         "circle": {"speed_mps": scene_mps, "radius_m": 0.3},
         "stop": {"speed_mps": scene_mps},
     }
     ideal = paths.programmed_motion(motion, **shape[motion])
-    count_m = felt.scale * 38e-6
+    count_m = scene.scale * 38e-6
     for measured in (ideal, Motion(ideal.t_s, np.round(ideal.position_m / count_m) * count_m)):
-        assert not (simulate(felt, measured).limiters & LIMITER_ENERGY).any()
+        assert not (simulate(scene, measured).limiters & LIMITER_ENERGY).any()
 
 
 @pytest.mark.slow
 def test_no_hand_gets_more_than_one_steps_work_whatever_it_does_and_the_liquid_is_felt_again_after():
-    """A hand that always goes where it is pushed, with steps of the greatest size that the door lets through."""
+    """The hand always goes where it is pushed, in the largest steps that sample validation accepts."""
     hand = Hand(WATER)
     hand.sweep(0.3, 600)
     place, longest_m, strongest_n = np.array([0.18, 0.0, 0.0]), 0.0003, 0.0
-    strongest_n = passivity(hand).strongest_n
+    strongest_n = passivity_controller(hand).strongest_n
     for _ in range(3000 if COMPILED else 300):
         sent = hand.sample[0].device_force_n
         size_n = np.linalg.norm(sent)
@@ -297,12 +305,12 @@ def test_no_hand_gets_more_than_one_steps_work_whatever_it_does_and_the_liquid_i
         place = place + step
         longest_m = max(longest_m, np.linalg.norm(step))
         hand.tick(place)
-        assert passivity(hand).balance_j >= -1e-3 - strongest_n * longest_m
+        assert passivity_controller(hand).balance_j >= -1e-3 - strongest_n * longest_m
     felt_n = 0.0
     for k in range(16_000 if COMPILED else 0):
         place = place + np.array([0.0, 0.0, 0.0003 if k // 200 % 2 else -0.0003])
         felt_n = np.linalg.norm(hand.tick(place).device_force_n)
-    assert passivity(hand).balance_j > -1e-3 or not COMPILED
+    assert passivity_controller(hand).balance_j > -1e-3 or not COMPILED
     assert felt_n > 1.0 or not COMPILED
 
 
@@ -312,7 +320,7 @@ def test_no_hand_gets_more_than_one_steps_work_whatever_it_does_and_the_liquid_i
 @settings(max_examples=examples(80), deadline=None)
 @given(data=st.data())
 def test_on_any_path_the_balance_stays_above_minus_1_mj_and_the_work_of_one_step(name, data):
-    """A step is the way between two samples that were not rejected: the controller sees nothing in between."""
+    """A step is the distance between two accepted samples, since the controller sees nothing in between."""
     hand = Hand(SCENES[name], faded_in=data.draw(st.booleans()))
     span_m = data.draw(st.sampled_from([1e-5, 1e-4, 1e-3, 9e-3]))
     coordinate = st.floats(-1, 1)
@@ -334,43 +342,43 @@ def test_on_any_path_the_balance_stays_above_minus_1_mj_and_the_work_of_one_step
             if not sample.limiters & LIMITER_GLITCH:
                 longest_m, accepted_m = max(longest_m, np.linalg.norm(place - accepted_m)), place
         last = sample.device_force_n.copy()
-        assert passivity(hand).balance_j >= -1e-3 - strongest_n * longest_m - 1e-12
+        assert passivity_controller(hand).balance_j >= -1e-3 - strongest_n * longest_m - 1e-12
         strongest_n = max(strongest_n, np.linalg.norm(last))
 
 
-def indebted(hand, *, fast, missing=0):
-    """Return the gain after each millisecond of slow motion; a debt of 50 mJ began before, in a fast motion or not."""
+def gains_after_debt(hand, *, fast, missing=0):
+    """Return the gain after each millisecond of slow motion, with an earlier debt of 50 mJ, from fast motion or not."""
     hz = 5.0 if fast else 1.0
     for k in range(400):
         hand.tick(None if 300 <= k < 300 + missing else (0.03 * np.sin(2e-3 * np.pi * hz * k), 0.0, 0.0))
-    passivity(hand).balance_j = -50e-3
+    passivity_controller(hand).balance_j = -50e-3
     gains = []
     for k in range(1500):
         hand.tick((0.03 * np.sin(0.8e-3 * np.pi * hz * 1e3) + 1e-4 * k, 0.0, 0.0))
-        gains.append(float(passivity(hand).gain))
+        gains.append(float(passivity_controller(hand).gain))
     return np.array(gains)
 
 
 @pytest.mark.compiled
 def test_a_debt_of_a_push_that_the_hand_made_is_forgiven_once_it_is_quiet():
-    gains = indebted(Hand(HONEY), fast=True)
+    gains = gains_after_debt(Hand(HONEY), fast=True)
     assert gains[0] < 0.05
     assert (gains[:300] < 0.1).all()
     assert (gains[900:] == 1.0).all()
     assert np.diff(gains).max() <= 1.01e-3 / 0.3
-    assert indebted(Hand(HONEY, rules=VERSIONS[2]), fast=True)[900:].max() < 0.2
+    assert gains_after_debt(Hand(HONEY, rules=VERSIONS[2]), fast=True)[900:].max() < 0.2
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("other", [{"fast": False}, {"fast": True, "missing": 5}])
 def test_a_debt_that_begins_in_slow_motion_or_after_a_gap_is_not_forgiven(other):
-    assert indebted(Hand(HONEY), **other)[900:].max() < 0.2
+    assert gains_after_debt(Hand(HONEY), **other)[900:].max() < 0.2
 
 
 @pytest.mark.compiled
 def test_with_a_force_link_no_debt_is_forgiven():
     linked = HONEY.model_copy(update={"link": ForceLink(delay_s=0.001)})
-    assert indebted(Hand(linked), fast=True).max() < 0.1
+    assert gains_after_debt(Hand(linked), fast=True).max() < 0.1
 
 
 def oscillating_gains(hz, speed_mps, *, stroke_mps=0.0, seconds=1.0, rules=CURRENT):
@@ -381,7 +389,7 @@ def oscillating_gains(hz, speed_mps, *, stroke_mps=0.0, seconds=1.0, rules=CURRE
         if t_s > 1.0:
             x_m += speed_mps * np.sin(2 * np.pi * hz * (t_s - 1.0)) / (2 * np.pi * hz)
         hand.tick((38e-6 * np.round(x_m / 38e-6), 0.0, 0.0))
-        gains.append(float(passivity(hand).gain))
+        gains.append(float(passivity_controller(hand).gain))
     return np.array(gains[1000:])
 
 
@@ -405,16 +413,19 @@ def test_the_gain_falls_at_9_5_hz_if_the_handle_is_faster_than_a_tremor():
 
 @pytest.mark.compiled
 def test_a_position_that_jumps_in_a_gap_neither_pays_a_debt_nor_counts_as_a_step():
-    """A step of 3 mm was the longest one for the rest of a scene, and the limit of the force in debt useless."""
+    """Otherwise a step of 3 mm would remain the longest of a scene, and the force limit in debt would be useless."""
     for rules, counts in ((VERSIONS[6], True), (CURRENT, False)):
         hand = Hand(HONEY, rules=rules)
         hand.sweep(0.2, 100)
-        longest_m, balance_j = passivity(hand).longest_m, passivity(hand).balance_j = 2e-4, -0.5e-3
+        longest_m, balance_j = passivity_controller(hand).longest_m, passivity_controller(hand).balance_j = (
+            2e-4,
+            -0.5e-3,
+        )
         for _ in range(6):
             hand.tick(None)
         hand.tick((0.02 + 3e-3, 0.0, 0.0))
-        assert bool(passivity(hand).longest_m > longest_m) == counts
-        assert bool(passivity(hand).balance_j > balance_j) == counts
+        assert bool(passivity_controller(hand).longest_m > longest_m) == counts
+        assert bool(passivity_controller(hand).balance_j > balance_j) == counts
 
 
 @pytest.mark.compiled
@@ -428,5 +439,5 @@ def test_a_position_that_jumps_in_a_gap_neither_pays_a_debt_nor_counts_as_a_step
     ],
     ids=["strokes of 8 Hz", "tremor", "two periods", "ripples of a stroke"],
 )
-def test_the_gain_stays_in_what_a_hand_does(motion):
+def test_the_gain_stays_1_in_motions_of_a_hand(motion):
     assert (oscillating_gains(**motion) == 1.0).all()

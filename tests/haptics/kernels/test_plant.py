@@ -32,7 +32,7 @@ def trace(handle, seconds, *, hand=STILL, force=None, tick_s=1e-3):
 
 
 @pytest.mark.parametrize("damping_ratio", [0.2, 1.0, 1.5])
-def test_the_step_response_is_that_of_mass_spring_and_damper(damping_ratio):
+def test_the_step_response_equals_that_of_mass_spring_and_damper(damping_ratio):
     mass, stiffness, step = 0.2, 400.0, 0.01
     own = math.sqrt(stiffness / mass)
     handle = new_handle(

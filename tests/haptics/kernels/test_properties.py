@@ -1,4 +1,4 @@
-"""What holds for any input at all, through the whole tick: door, estimator, liquids, safety."""
+"""Properties of the whole tick for arbitrary input: sample validation, estimator, liquids, safety."""
 
 import numpy as np
 import pytest

@@ -9,12 +9,12 @@ from tests.haptics.scenes import WATER_FACTOR, liquid, scene
 CUBE = Box(size_m=(0.2, 0.2, 0.2))
 
 
-def shares(felt, position_m, interval_s=1e-3):
+def shares(scene, position_m, interval_s=1e-3):
     """Return φ of the scene's water at each place: the drag at a given 1 m/s along x over the drag of full water."""
     position_m = np.asarray(position_m, float)
     velocity_mps = np.tile([1.0, 0.0, 0.0], (len(position_m), 1))
     motion = Motion(interval_s * np.arange(len(position_m)), position_m, velocity_mps=velocity_mps)
-    return simulate(felt, motion).fx_n / -WATER_FACTOR
+    return simulate(scene, motion).fx_n / -WATER_FACTOR
 
 
 def walk(x_m, y_m=0.0, z_m=0.0):
@@ -36,9 +36,9 @@ def walk(x_m, y_m=0.0, z_m=0.0):
     ],
 )
 def test_a_region_holds_its_border_and_nothing_beyond(region, inside, outside):
-    felt = scene(liquid(region=region))
-    assert [shares(felt, [place])[0] for place in inside] == pytest.approx([1] * len(inside))
-    assert [shares(felt, [place])[0] for place in outside] == [0] * len(outside)
+    region_scene = scene(liquid(region=region))
+    assert [shares(region_scene, [place])[0] for place in inside] == pytest.approx([1] * len(inside))
+    assert [shares(region_scene, [place])[0] for place in outside] == [0] * len(outside)
 
 
 def test_entering_and_leaving_fade_over_20_ms():
@@ -62,8 +62,8 @@ def test_the_border_has_a_millimetre_of_hysteresis(axis):
 
 
 def test_where_liquids_overlap_the_last_listed_counts():
-    felt = scene(liquid(1000, id="all"), liquid(3000, id="part", region=CUBE))
-    phi = shares(felt, walk([1.0] * 3 + [0.0] * 25 + [1.0] * 25))
+    overlapping = scene(liquid(1000, id="all"), liquid(3000, id="part", region=CUBE))
+    phi = shares(overlapping, walk([1.0] * 3 + [0.0] * 25 + [1.0] * 25))
     assert phi[0] == pytest.approx(1)
     assert phi[3] == pytest.approx(0.95 + 3 * 0.05)
     assert phi[27] == pytest.approx(3)

@@ -110,20 +110,20 @@ def test_added_mass_and_history_are_weakened_where_the_loop_bears_less():
     inert = scene(liquid(1400, viscosity_pa_s=10.0, effects=("added_mass", "history")), scale=3)
     t_s = np.arange(400) / 1000
     swaying = Motion(t_s, np.column_stack([0.01 * np.sin(20 * t_s), 0 * t_s, 0 * t_s]))
-    felt = simulate(inert, swaying)
-    assert (felt.device_fx_n == felt.fx_n).all()
+    table = simulate(inert, swaying)
+    assert (table.device_fx_n == table.fx_n).all()
     coarse = scene(*inert.liquids, scale=3, velocity=Raw())
-    felt = simulate(coarse, swaying)
-    ratio = felt.device_fx_n[100:] / felt.fx_n[100:]
+    table = simulate(coarse, swaying)
+    ratio = table.device_fx_n[100:] / table.fx_n[100:]
     share = pack(coarse).liquids[0].inertia_share[1]
     assert 0.02 < share < 0.5
     assert ratio == pytest.approx(share)
-    assert (felt.limiters[100:] & LIMITER_SLOPE != 0).all()
+    assert (table.limiters[100:] & LIMITER_SLOPE != 0).all()
 
 
 @pytest.mark.parametrize("velocity", [Ewma(), Kalman()], ids=["ewma", "kalman"])
 @pytest.mark.parametrize("effects", [("drag",), ("added_mass", "history")], ids=["drag", "inertia"])
-def test_what_slope_limits_take_counts_as_withheld(effects, velocity):
+def test_force_removed_by_slope_limits_counts_as_withheld(effects, velocity):
     steep = scene(liquid(20_000, viscosity_pa_s=10.0, effects=effects), scale=30, velocity=velocity, knee=UNBENT)
     hand = Hand(steep, dynamics=Dynamics(delay_s=1e-3, count_m=38e-6, mass_kg=0.1))
     for sample in [hand.tick((0.004 * np.sin(0.02 * k), 0.0, 0.0)) for k in range(400)]:
@@ -137,7 +137,7 @@ def test_what_slope_limits_take_counts_as_withheld(effects, velocity):
     assert sample.permitted_n == pytest.approx(size(late.safety[0].permitted_n))
 
 
-def test_the_slew_limit_does_not_remember_what_the_passivity_controller_added():
+def test_the_slew_limit_ignores_the_force_added_by_the_passivity_controller():
     hand = Hand(WATER)
     hand.sweep(0.3, 600)
     hand.safety[0].passivity.balance_j = -5e-3
@@ -174,7 +174,7 @@ def test_a_drag_within_its_slope_is_sent_as_it_is():
 
 
 @pytest.mark.compiled
-def test_the_slope_is_that_of_the_relative_speed_so_a_push_is_left_alone():
+def test_the_slope_limit_uses_the_relative_speed_and_keeps_a_push():
     still = moving(np.concatenate([np.tile([3.0, 0, 0], (1500, 1)), np.zeros((30, 3))]))
     table = simulate(WATER, still)
     assert table.fx_n[-1] > 1.0
@@ -226,22 +226,22 @@ def test_the_force_changes_by_at_most_the_slew_limit_per_tick():
 def test_the_slew_limit_knows_rate_and_mass(period_s, mass_kg, expected):
     device = Dynamics(delay_s=0.0, count_m=38e-6, mass_kg=mass_kg)
     assert slew_limit_n(period_s, device) == pytest.approx(expected)
-    felt = HONEY.model_copy(update={"rate_hz": 1 / period_s})
-    assert pack(felt, dynamics=device).parameters[0].slew_n == pytest.approx(expected)
+    scene = HONEY.model_copy(update={"rate_hz": 1 / period_s})
+    assert pack(scene, dynamics=device).parameters[0].slew_n == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("delay_s", "share"), [(1e-3, KALMAN_SLEW), (None, 1.0)])
 def test_the_slew_limit_is_lower_with_the_kalman_filter_which_needs_a_measured_delay(delay_s, share):
-    device, felt = Dynamics(delay_s), HONEY.model_copy(update={"velocity": Kalman()})
+    device, scene = Dynamics(delay_s), HONEY.model_copy(update={"velocity": Kalman()})
     assert slew_limit_n(1e-3, device, Kalman()) == pytest.approx(share * SLEW_N)
-    assert pack(felt, dynamics=device).parameters[0].slew_n == pytest.approx(share * SLEW_N)
+    assert pack(scene, dynamics=device).parameters[0].slew_n == pytest.approx(share * SLEW_N)
 
 
 @pytest.mark.parametrize("velocity", [Ewma(), Kalman()])
 def test_a_light_device_bears_less_damping_by_its_mass(velocity):
-    felt = HONEY.model_copy(update={"velocity": velocity})
+    scene = HONEY.model_copy(update={"velocity": velocity})
     whole, half = (
-        pack(felt, dynamics=Dynamics(delay_s=0.0, count_m=38e-6, mass_kg=kg)).parameters[0] for kg in (0.1, 0.05)
+        pack(scene, dynamics=Dynamics(delay_s=0.0, count_m=38e-6, mass_kg=kg)).parameters[0] for kg in (0.1, 0.05)
     )
     assert LIGHTER > 1
     assert half.slope_limit_nspm == pytest.approx(0.5**LIGHTER * whole.slope_limit_nspm)
@@ -253,8 +253,8 @@ def test_after_an_energy_debt_the_force_changes_more_slowly():
         hand.sweep(0.001, 50)
         passivity = hand.safety[0].passivity
         passivity.gain = gain
-        felt = [hand.tick((0.00005 + 0.002 * k, 0.0, 0.0)).device_force_n[0] for k in range(1, 60)]
-        return np.abs(np.diff(felt)).max()
+        forces_n = [hand.tick((0.00005 + 0.002 * k, 0.0, 0.0)).device_force_n[0] for k in range(1, 60)]
+        return np.abs(np.diff(forces_n)).max()
 
     assert steepest(1.0) == pytest.approx(SLEW_N, rel=1e-3)
     assert steepest(0.2) == pytest.approx(SLEW_N / 3, rel=0.1)

@@ -18,13 +18,13 @@ def test_the_hand_is_mapped_into_the_scene_by_scale_and_origin():
 def test_without_a_new_sample_the_model_rests_and_the_next_one_covers_the_gap():
     hand = Hand(RAW)
     hand.tick((0.0, 0.0, 0.0))
-    felt = hand.tick((0.001, 0.0, 0.0))
-    assert felt.velocity_mps[0] == pytest.approx(1.0)
+    first = hand.tick((0.001, 0.0, 0.0))
+    assert first.velocity_mps[0] == pytest.approx(1.0)
     model = [field.copy() for field in hand.model.arrays]
     still = hand.tick(None)
     assert all((now == before).all() for now, before in zip(hand.model.arrays, model, strict=True))
-    assert still.velocity_mps[0] == felt.velocity_mps[0]
-    assert (still.force_n == felt.force_n).all()
+    assert still.velocity_mps[0] == first.velocity_mps[0]
+    assert (still.force_n == first.force_n).all()
     hand.tick(None)
     assert hand.tick((0.004, 0.0, 0.0)).velocity_mps[0] == pytest.approx(1.0)
 
@@ -47,7 +47,7 @@ def test_ten_metres_a_second_of_hand_is_the_border_whatever_the_scale():
         assert hand.tick((0.02001, 0, 0)).limiters & LIMITER_GLITCH == 0  # 2 ms have passed by then
 
 
-def test_after_five_refusals_in_a_row_the_motion_begins_anew():
+def test_after_five_rejected_samples_in_a_row_the_motion_restarts():
     hand = Hand(WATER)
     before = hand.sweep(0.1, 200)[-1]
     assert before.wake_mps[0] > 0
@@ -107,39 +107,42 @@ def test_a_pause_before_the_first_sample_is_silence_from_the_first_tick_on():
     assert hand.tick(None, after_ns=50 * TICK_NS).status == STATUS_STALE_FAULT
 
 
-def stirred(hand, ticks, *, wrong=None, gap=(0, 0), off_m=0.0):
+def stirring_samples(hand, ticks, *, wrong=None, gap=(0, 0), off_m=0.0):
     """Stir at 0.2 m/s in circles of 30 mm; return the samples.
 
     ``wrong`` are the ticks with their errors (3,) [m], ``gap`` the ticks without a sample, ``off_m`` an error after it.
     """
-    found = []
+    samples = []
     for k in range(ticks):
         angle = 0.2 / 0.03 * 1e-3 * k
         place = 0.03 * np.array([np.cos(angle), 0.0, np.sin(angle)]) + (wrong or {}).get(k, 0.0)
         place[1] += off_m if k >= gap[1] else 0.0
-        found.append(hand.tick(None if gap[0] <= k < gap[1] else np.round(place / 38e-6) * 38e-6))
-    return found
+        samples.append(hand.tick(None if gap[0] <= k < gap[1] else np.round(place / 38e-6) * 38e-6))
+    return samples
 
 
-def withheld(samples):
+def withheld_share(samples):
     return sum(sample.withheld_n for sample in samples) / sum(sample.permitted_n for sample in samples)
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("wrong_m", [(0.0, 0.005, 0.0), (0.002, 0.0, 0.002), (0.0, 0.0, -0.02)])
 def test_a_sample_that_no_hand_can_make_costs_no_force(wrong_m):
-    """Under the rules before, 5 mm take 98 % of honey's force for seconds."""
-    found = stirred(Hand(HONEY), 2000, wrong={500: np.array(wrong_m)})
-    refused = [k for k, sample in enumerate(found) if sample.limiters & LIMITER_GLITCH]
+    """Under earlier rules, an error of 5 mm removes 98 % of honey's force for seconds."""
+    samples = stirring_samples(Hand(HONEY), 2000, wrong={500: np.array(wrong_m)})
+    refused = [k for k, sample in enumerate(samples) if sample.limiters & LIMITER_GLITCH]
     assert refused == [500]
-    assert withheld(found[500:]) < 1e-3
+    assert withheld_share(samples[500:]) < 1e-3
     if wrong_m[1]:
-        assert withheld(stirred(Hand(HONEY, rules=VERSIONS[2]), 2000, wrong={500: np.array(wrong_m)})[600:]) > 0.5
+        assert (
+            withheld_share(stirring_samples(Hand(HONEY, rules=VERSIONS[2]), 2000, wrong={500: np.array(wrong_m)})[600:])
+            > 0.5
+        )
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("path", ["shaken", "stopped", "repeated", "late", "kicked"])
-def test_what_hands_devices_and_computers_do_is_not_refused(path):
+def test_plausible_motions_are_not_rejected(path):
     """5 Hz ±30 mm, an end stop at 1 m/s, repeated samples at 0.5 m/s, ticks late by 0.9 ms, 50 m/s² from rest."""
     hand, t_s = Hand(HONEY), np.arange(1000) * 1e-3
     row = np.arange(1000)
@@ -153,36 +156,40 @@ def test_what_hands_devices_and_computers_do_is_not_refused(path):
     }[path]
     late_ns = 900_000 * (row % 5 == 0) * (path == "late")
     after_ns = TICK_NS + np.diff(late_ns, prepend=0)
-    found = [
+    samples = [
         hand.tick((np.round(x / 38e-6) * 38e-6, 0.0, 0.0), after_ns=int(ns))
         for x, ns in zip(x_m, after_ns, strict=True)
     ]
-    assert sum(bool(sample.limiters & LIMITER_GLITCH) for sample in found) == 0
+    assert sum(bool(sample.limiters & LIMITER_GLITCH) for sample in samples) == 0
 
 
 def test_a_motion_that_begins_like_a_jump_is_felt_after_five_samples():
     hand = Hand(RAW)
     for _ in range(50):
         hand.tick((0.0, 0.0, 0.0))
-    felt = [hand.tick((0.002 * k, 0.0, 0.0)) for k in range(1, 11)]
-    assert [bool(sample.limiters & LIMITER_GLITCH) for sample in felt] == [True] * 4 + [False] * 6
-    assert [sample.velocity_mps[0] for sample in felt] == pytest.approx([0.0] * 5 + [2.0] * 5)
+    samples = [hand.tick((0.002 * k, 0.0, 0.0)) for k in range(1, 11)]
+    assert [bool(sample.limiters & LIMITER_GLITCH) for sample in samples] == [True] * 4 + [False] * 6
+    assert [sample.velocity_mps[0] for sample in samples] == pytest.approx([0.0] * 5 + [2.0] * 5)
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("velocity", [Ewma(), Kalman()])
-def test_a_jump_during_a_gap_is_no_motion(velocity):
+def test_a_jump_during_a_gap_does_not_count_as_motion(velocity):
     """The jump is 1 m/s over the gap, 10 m/s in the scene."""
-    found = stirred(Hand(HONEY.model_copy(update={"velocity": velocity})), 1000, gap=(500, 520), off_m=0.02)
-    assert not any(sample.limiters & LIMITER_GLITCH for sample in found)
-    assert max(abs(sample.velocity_mps[1]) for sample in found) < 0.5
-    assert np.linalg.norm(found[520].device_force_n) < 0.5
-    assert np.linalg.norm(found[-1].device_force_n) == pytest.approx(np.linalg.norm(found[499].device_force_n), rel=0.1)
-    assert withheld(found[520:]) == pytest.approx(withheld(found[:500]), abs=1e-2)  # only the slope limit takes any
+    samples = stirring_samples(Hand(HONEY.model_copy(update={"velocity": velocity})), 1000, gap=(500, 520), off_m=0.02)
+    assert not any(sample.limiters & LIMITER_GLITCH for sample in samples)
+    assert max(abs(sample.velocity_mps[1]) for sample in samples) < 0.5
+    assert np.linalg.norm(samples[520].device_force_n) < 0.5
+    assert np.linalg.norm(samples[-1].device_force_n) == pytest.approx(
+        np.linalg.norm(samples[499].device_force_n), rel=0.1
+    )
+    assert withheld_share(samples[520:]) == pytest.approx(
+        withheld_share(samples[:500]), abs=1e-2
+    )  # only the slope limit takes any
 
 
 @pytest.mark.compiled
 def test_a_gap_in_a_steady_motion_keeps_estimator_and_wake():
-    held = stirred(Hand(WATER), 530, gap=(500, 506))
+    held = stirring_samples(Hand(WATER), 530, gap=(500, 506))
     assert np.linalg.norm(held[506].wake_mps) > 0.9 * np.linalg.norm(held[499].wake_mps) > 0.0
     assert np.linalg.norm(held[506].velocity_mps) == pytest.approx(2.0, rel=0.1)

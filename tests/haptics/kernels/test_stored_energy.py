@@ -1,4 +1,4 @@
-"""What liquids give back with "kalman", whose added mass and history smooth for longer than its velocity lags."""
+"""Energy returned by liquids with "kalman", whose added mass and history are smoothed longer than its lag."""
 
 import numpy as np
 import pytest
@@ -17,10 +17,10 @@ RHO_V = 1400 * 4 / 3 * np.pi * 0.034**3
 STOKES_LAYER_KG = 3 * np.pi * 0.034**2 * np.sqrt(2 * 10.0 * 1400 / (2 * np.pi * 50))  # at 50 Hz
 
 
-def inert(velocity=None, effects=("added_mass", "history"), **fields):
+def inert_scene(velocity=None, effects=("added_mass", "history"), **fields):
     """Return a scene of a viscous liquid with these effects alone."""
-    one = liquid(1400, viscosity_pa_s=10.0, effects=effects, **fields)
-    return Scene(scale=3, liquids=(one,), velocity=velocity or Kalman())
+    medium = liquid(1400, viscosity_pa_s=10.0, effects=effects, **fields)
+    return Scene(scale=3, liquids=(medium,), velocity=velocity or Kalman())
 
 
 @pytest.mark.parametrize(
@@ -33,17 +33,19 @@ def inert(velocity=None, effects=("added_mass", "history"), **fields):
     ids=["ewma", "kalman", "delay unknown"],
 )
 def test_accelerations_are_smoothed_as_suits_the_estimator(velocity, dynamics, added_s, history_s):
-    found = pack(inert(velocity), dynamics=dynamics).liquids[0]
-    assert 1 / found.added_mass.filter_per_s == pytest.approx(added_s)
-    assert 1 / found.history.filter_per_s == pytest.approx(history_s)
+    packed = pack(inert_scene(velocity), dynamics=dynamics).liquids[0]
+    assert 1 / packed.added_mass.filter_per_s == pytest.approx(added_s)
+    assert 1 / packed.history.filter_per_s == pytest.approx(history_s)
 
 
 @pytest.mark.parametrize(
     ("effect", "inertia_kg"), [("added_mass", 0.5 * RHO_V), ("history", STOKES_LAYER_KG)], ids=["added mass", "history"]
 )
 def test_inertia_holds_the_energy_of_the_velocity_as_smoothed(effect, inertia_kg):
-    """A hand that comes to rest gets back ½ m (|2 v₁ - v₂|² + |v₁ - v₂|²) at most, v smoothed once and twice."""
-    hand = Hand(inert(effects=(effect,)), dynamics=MEASURED._replace(mass_kg=0.09))  # too light for the known force
+    """A stopping hand gets back at most ½ m (|2 v₁ - v₂|² + |v₁ - v₂|²), with v smoothed once and twice."""
+    hand = Hand(
+        inert_scene(effects=(effect,)), dynamics=MEASURED._replace(mass_kg=0.09)
+    )  # too light for the known force
     share, rate = hand.model.liquids[0].inertia_share[1], hand.model.liquids[0].smoothing_rate[1]
     speeds = np.concatenate([np.full(300, 0.3), np.linspace(0.3, 0.0, 30)])
     once_mps = twice_mps = 0.0
@@ -61,8 +63,8 @@ def test_inertia_holds_the_energy_of_the_velocity_as_smoothed(effect, inertia_kg
 
 
 def test_no_more_energy_is_stored_than_the_hand_put_in():
-    """Of random motion: the work on the added mass is at least what it may return, which is nearly all at times."""
-    hand = Hand(inert(effects=("added_mass",)), dynamics=MEASURED)
+    """In random motion, the work on the added mass is at least the energy that it may return, at times nearly all."""
+    hand = Hand(inert_scene(effects=("added_mass",)), dynamics=MEASURED)
     place_m = (
         0.02
         * np.random.default_rng(2).normal(size=(6, 2))
@@ -80,16 +82,16 @@ def test_no_more_energy_is_stored_than_the_hand_put_in():
 
 @pytest.mark.parametrize("velocity", [Ewma(), Kalman()], ids=["ewma", "kalman"])
 def test_the_force_has_no_cliff_where_inertia_exceeds_its_limit(velocity):
-    """Of ever greater scales, the share of damping that is sent changes little from one to the next."""
+    """The sent share of damping changes little between neighbouring scales."""
     sent_nspm, before = [], None
     for scale in np.geomspace(0.1, 40, 600):
-        scene = inert(velocity).model_copy(update={"scale": float(scale)})
-        found = pack(scene, dynamics=MEASURED).liquids[0]
-        rates = found.smoothing_rate
-        mass_nspm = found.added_mass.mass_kg * found.added_mass.filter_per_s * rates
-        history_nspm = 0.7 * found.history.factor_kg_rs * np.sqrt(found.history.filter_per_s * rates)
-        sent_nspm.append(scale * found.inertia_share * (mass_nspm + history_nspm))
-        delivered = found.inertia_share, rates
+        scene = inert_scene(velocity).model_copy(update={"scale": float(scale)})
+        packed = pack(scene, dynamics=MEASURED).liquids[0]
+        rates = packed.smoothing_rate
+        mass_nspm = packed.added_mass.mass_kg * packed.added_mass.filter_per_s * rates
+        history_nspm = 0.7 * packed.history.factor_kg_rs * np.sqrt(packed.history.filter_per_s * rates)
+        sent_nspm.append(scale * packed.inertia_share * (mass_nspm + history_nspm))
+        delivered = packed.inertia_share, rates
         assert before is None or np.abs(np.subtract(delivered, before)).max() < 0.05
         before = delivered
     limits = [handle_limits(1e-3, delay, velocity) for delay in range(5)]

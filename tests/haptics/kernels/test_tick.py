@@ -21,13 +21,13 @@ SCENES = {**THESIS, "many": MANY, **EVERYTHING}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("felt", SCENES.values(), ids=SCENES)
-def test_the_servos_tick_and_simulate_are_the_same(felt):
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_the_servos_tick_and_simulate_are_the_same(scene):
     positions_m = stroke(1500)
-    hand = Hand(felt)
+    hand = Hand(scene)
     live = [hand.tick(place) for place in positions_m]
     t_s = 1e-9 * (np.array([sample.time_ns for sample in live]) - live[0].time_ns)
-    table = simulate(felt, Motion(t_s, felt.scale * positions_m))
+    table = simulate(scene, Motion(t_s, scene.scale * positions_m))
     for kind, field in [("velocity", "velocity_mps"), ("wake", "wake_mps"), ("force", "force_n")]:
         assert vectors(table, kind) == pytest.approx(np.array([sample[field] for sample in live]), abs=1e-9)
     sent = np.array([sample.device_force_n for sample in live])
@@ -62,15 +62,15 @@ def run(model, safety, sample, positions_m, ticks):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="the interpreter allocates all the time")
-@pytest.mark.parametrize("felt", [Scene(), *SCENES.values()], ids=["rest", *SCENES])
-def test_hazard_18_no_tick_allocates_so_no_collection_can_pause_it(felt):
+@pytest.mark.parametrize("scene", [Scene(), *SCENES.values()], ids=["rest", *SCENES])
+def test_hazard_18_no_tick_allocates_so_no_collection_can_pause_it(scene):
     def allocations(ticks):
         before = rtsys.get_allocation_stats()
         run(model, safety[0], sample[0], positions_m, ticks)
         after = rtsys.get_allocation_stats()
         return after.alloc - before.alloc, after.mi_alloc - before.mi_alloc
 
-    model, safety, sample, positions_m = pack(felt), new_safety(), records(SAMPLE, 1), stroke(4000)
+    model, safety, sample, positions_m = pack(scene), new_safety(), records(SAMPLE, 1), stroke(4000)
     run(model, safety[0], sample[0], positions_m, 10)
     _nrt_python.memsys_enable_stats()
     try:

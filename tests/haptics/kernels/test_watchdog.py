@@ -1,4 +1,4 @@
-"""The watchdog: ticks that come late, or not at all, and a program that stands still beside the servo."""
+"""The watchdog: late and missing ticks, and a program that freezes beside the servo."""
 
 import ctypes
 import sys
@@ -20,14 +20,14 @@ from study_app.haptics.runtime.offline import take_sample
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.recording_device import Probe
-from tests.haptics.running import felt, force_n, is_zero, wait_until
+from tests.haptics.running import bring_to_force, force_n, is_zero, wait_until
 from tests.haptics.scenes import HONEY, WATER
 
 MS = 1_000_000
 
 
 class Bench:
-    """A servo on a virtual clock whose ticks can be kept from coming, with a probe that moves."""
+    """A servo on a virtual clock whose ticks can be withheld, with a moving probe."""
 
     def __init__(self):
         self.probe, self.clock = Probe(), VirtualClock()
@@ -35,7 +35,7 @@ class Bench:
         self.reader = self.servo.telemetry.reader()
 
     def be_late(self, late_ms):
-        """Let a tick come so late, and take it."""
+        """Take a tick that comes late by this time."""
         self.clock.memory[0].now_ns += round((1 + late_ms) * MS)
         return self.servo.advance(1)
 
@@ -51,7 +51,7 @@ def bench():
 
 @pytest.mark.parametrize("late_ms", [0.5, 4.9])
 def test_a_tick_that_is_a_little_late_costs_nothing(bench, late_ms):
-    felt(bench.servo)
+    bring_to_force(bench.servo)
     bench.be_late(late_ms)
     assert bench.fade == 1.0
     assert bench.servo.telemetry.latest().limiters & LIMITER_STALE == 0
@@ -59,7 +59,7 @@ def test_a_tick_that_is_a_little_late_costs_nothing(bench, late_ms):
 
 @pytest.mark.parametrize("late_ms", [6.0, 14.0, 27.5, 49.0])
 def test_a_late_tick_finds_the_force_fading_as_without_samples(bench, late_ms):
-    felt(bench.servo)
+    bring_to_force(bench.servo)
     bench.reader.read()
     bench.be_late(late_ms)
     share = max(1 - (late_ms - 5) / 10, 0)
@@ -76,7 +76,7 @@ def test_a_late_tick_finds_the_force_fading_as_without_samples(bench, late_ms):
 
 def test_the_slew_limit_does_not_prolong_the_fade_out(bench):
     bench.probe.state.velocity_mps *= 2.0
-    felt(bench.servo)
+    bring_to_force(bench.servo)
     assert force_n(bench.servo.telemetry) > 7.0
     bench.probe.state.silent_from_read = bench.probe.state.reads + 1
     bench.servo.advance(16)
@@ -85,7 +85,7 @@ def test_the_slew_limit_does_not_prolong_the_fade_out(bench):
 
 @pytest.mark.parametrize("late_ms", [50.0, 300.0])
 def test_after_fifty_milliseconds_without_a_tick_the_force_is_zero_and_returns_as_at_a_start(bench, late_ms):
-    felt(bench.servo)
+    bring_to_force(bench.servo)
     bench.reader.read()
     bench.be_late(late_ms)
     assert bench.fade == 0.0
@@ -98,7 +98,7 @@ def test_after_fifty_milliseconds_without_a_tick_the_force_is_zero_and_returns_a
 
 @pytest.mark.parametrize(("hang_ms", "sent"), [(49, True), (50, False), (300, False)])
 def test_a_tick_of_50_ms_or_more_ends_with_zero_force(bench, hang_ms, sent):
-    felt(bench.servo)
+    bring_to_force(bench.servo)
     assert np.linalg.norm(bench.probe.forces_n[-1]) > 1.0
     bench.probe.stall(bench.clock, int(bench.probe.state.reads) + 1, hang_ms * MS)
     bench.reader.read()
@@ -114,16 +114,16 @@ def test_a_tick_of_50_ms_or_more_ends_with_zero_force(bench, hang_ms, sent):
 
 
 def test_a_tick_that_hung_in_its_device_is_replayed_to_the_bit(bench):
-    felt(bench.servo)
+    bring_to_force(bench.servo)
     bench.probe.stall(bench.clock, int(bench.probe.state.reads) + 1, 80 * MS)
     bench.servo.advance(300)
     samples = bench.reader.read()
     assert np.flatnonzero(samples.limiters & LIMITER_STOP).tolist() == [1001]
-    assert np.array_equal(replayed(samples, HONEY), samples.device_force_n)
+    assert np.array_equal(replayed_forces(samples, HONEY), samples.device_force_n)
 
 
 @pytest.mark.slow
-def test_a_servo_that_hangs_in_its_device_says_so_and_has_let_go_when_it_returns():
+def test_a_servo_hanging_in_its_device_is_reported_and_releases_the_force():
     probe = Probe()
     servo = Servo(probe)
     try:
@@ -149,7 +149,7 @@ def test_a_servo_that_hangs_in_its_device_says_so_and_has_let_go_when_it_returns
         servo.stop()
 
 
-def replayed(samples, scene):
+def replayed_forces(samples, scene):
     """Return the forces (n, 3) [N] of readings at their times, as a replay computes them: no thread, no clock."""
     again = samples.copy()
     rest, model, safety = pack(scene.model_copy(update={"liquids": ()})), pack(scene), new_safety(8.0)
@@ -165,7 +165,7 @@ def replayed(samples, scene):
 @pytest.mark.realtime
 @pytest.mark.skipif(sys.platform == "win32", reason="a sleep of POSIX")
 def test_five_seconds_in_which_python_stands_still_change_no_force():
-    """The windows' thread holds the interpreter in one call; each force is still that of its reading, to the bit."""
+    """One call of the windows' thread holds the interpreter; each force still equals that of its reading exactly."""
     freeze = ctypes.PyDLL(None).usleep  # a PyDLL does not let the interpreter go: every thread of Python stands still
     device = ScriptedDevice(Random(5))  # noqa: S311
     t_s = np.arange(0, 20, 0.005)
@@ -191,4 +191,4 @@ def test_five_seconds_in_which_python_stands_still_change_no_force():
     assert np.linalg.norm(samples.device_force_n[frozen], axis=1).max() > 0.5
     first = int(np.flatnonzero(samples.scene)[0])
     assert is_zero(samples.device_force_n[:first])
-    assert np.array_equal(replayed(samples, WATER), samples.device_force_n)
+    assert np.array_equal(replayed_forces(samples, WATER), samples.device_force_n)

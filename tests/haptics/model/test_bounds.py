@@ -50,7 +50,7 @@ WANDERINGS = [wandering(seed) for seed in range(4)]
 
 
 def box_of(motion, velocity_mps=SPEED_MPS):
-    """Return the box that a motion keeps to."""
+    """Return the motion box that contains a motion."""
     depth_m = -motion.position_m[:, 1]
     return MotionBox(
         speed_mps=velocity_mps, acceleration_mps2=ACCELERATION_MPS2, depth_m=(depth_m.min(), depth_m.max())
@@ -70,7 +70,7 @@ def with_effects(scene, effects, law=REFERENCE):
     return scene.model_copy(update={"liquids": (liquid,)})
 
 
-def felt(scene, motion):
+def simulated_force(scene, motion):
     """Return the force (n, 3) [N]."""
     return vectors(simulate(scene, motion), "force")
 
@@ -80,7 +80,7 @@ ALL = ("drag", "current", "buoyancy", "surface", "added_mass", "history")
 
 @pytest.mark.parametrize("name", LIQUIDS)
 @pytest.mark.parametrize("current", CURRENTS)
-def test_what_auto_leaves_out_is_never_missed_by_more_than_the_target(name, current):
+def test_effects_omitted_by_auto_change_the_force_by_no_more_than_the_target(name, current):
     for motion in WANDERINGS:
         scene = pool(name, motion, current=CURRENTS[current], effects="auto")
         scene = scene.model_copy(update={"accuracy": Accuracy(without=("unsteady_drag",))})
@@ -88,7 +88,7 @@ def test_what_auto_leaves_out_is_never_missed_by_more_than_the_target(name, curr
         total_n = sum(verdict.bound_n for verdict in verdicts)
         target_n = max(0.05 * total_n, 0.05)
         chosen = resolve(scene)
-        missing_n = felt(with_effects(scene, ALL), motion) - felt(chosen, motion)
+        missing_n = simulated_force(with_effects(scene, ALL), motion) - simulated_force(chosen, motion)
         law_n = max(0.05 * bounds(scene, scene.liquids[0])["drag"], 0.05) if "drag" in chosen.liquids[0].effects else 0
         assert np.linalg.norm(missing_n, axis=1).max() <= target_n + law_n
 
@@ -104,5 +104,5 @@ def test_the_worst_motion_for_history_all_but_reaches_its_bound():
     )
     liquid = Liquid(id="honey", density_kg_m3=1420, viscosity_pa_s=10, history={"smoothing_s": 0})
     scene = scene.model_copy(update={"liquids": (liquid,)})
-    force_n = felt(with_effects(scene, ["history"]), motion)
+    force_n = simulated_force(with_effects(scene, ["history"]), motion)
     assert -force_n[-1, 0] == pytest.approx(bounds(scene, liquid)["history"], rel=0.02)

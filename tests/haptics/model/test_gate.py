@@ -23,7 +23,7 @@ STROKE_M = 0.04
 HOLLOW = Body(density_kg_m3=0.01)
 
 
-def stirred(name, speed_mps, *, body=HOLLOW, **fields):
+def stirred_scene(name, speed_mps, *, body=HOLLOW, **fields):
     """Return a scene of scale 1 in which a hand strokes ±4 cm at up to this speed; fields are the liquid's."""
     density, viscosity = LIQUIDS[name]
     liquid = Liquid(**{"id": name, "density_kg_m3": density, "viscosity_pa_s": viscosity, "effects": "auto", **fields})
@@ -31,8 +31,8 @@ def stirred(name, speed_mps, *, body=HOLLOW, **fields):
     return Scene(scale=1, body=body, motion=box, liquids=(liquid,))
 
 
-def taken(scene):
-    """Return the names of the effects that are in."""
+def selected_effects(scene):
+    """Return the names of the selected effects."""
     return [verdict.effect for verdict in effect_verdicts(scene) if verdict.included]
 
 
@@ -55,8 +55,8 @@ WITHOUT_UNSTEADY_DRAG = {"accuracy": Accuracy(without=("unsteady_drag",))}
     ],
 )
 def test_worked_examples(name, speed_mps, effects):
-    """Still pool and slow hand, fast stirring; the sum rule takes history in where a rule for each alone would not."""
-    assert taken(stirred(name, speed_mps).model_copy(update=WITHOUT_UNSTEADY_DRAG)) == effects
+    """A still pool, a slow hand and fast stirring; the sum rule includes history where a rule per effect would not."""
+    assert selected_effects(stirred_scene(name, speed_mps).model_copy(update=WITHOUT_UNSTEADY_DRAG)) == effects
 
 
 @pytest.mark.parametrize(
@@ -71,25 +71,25 @@ def test_worked_examples(name, speed_mps, effects):
         ("tar", 0.1, 6.6, 0.024, 1.2, 1.86),
     ],
 )
-def test_bounds_are_those_of_the_published_table(name, speed_mps, drag_n, added_mass_n, history_n, buoyancy_n):
+def test_bounds_equal_the_published_table(name, speed_mps, drag_n, added_mass_n, history_n, buoyancy_n):
     """The table's history is the amplitude of a sinusoid; the bound is the worst motion, √2 · 2/√π = 1.6 times that."""
-    scene = stirred(name, speed_mps)
+    scene = stirred_scene(name, speed_mps)
     assert bound(scene, "drag") == pytest.approx(drag_n, rel=0.07)
     assert bound(scene, "added_mass") == pytest.approx(added_mass_n, rel=0.03)
     assert bound(scene, "history") == pytest.approx(history_n * 2 * math.sqrt(2 / math.pi), rel=0.05)
     assert bound(scene, "buoyancy") == pytest.approx(buoyancy_n, rel=0.01)
 
 
-def test_a_current_is_bounded_by_the_drag_it_adds_and_its_shear_by_what_it_ticks():
-    still = stirred("water", 0.5)
-    uniform = stirred("water", 0.5, current=Uniform(velocity_mps=(0.3, 0.0, 0.4)))
+def test_a_current_is_bounded_by_its_drag_and_its_shear_by_its_inertia():
+    still = stirred_scene("water", 0.5)
+    uniform = stirred_scene("water", 0.5, current=Uniform(velocity_mps=(0.3, 0.0, 0.4)))
     liquid = uniform.liquids[0]
     assert bound(uniform, "current") == pytest.approx(
         resistance_n(uniform, liquid, 1.0) - resistance_n(uniform, liquid, 0.5)
     )
     assert bound(uniform, "added_mass") == bound(still, "added_mass")
-    channel = stirred("water", 0.5, current=Channel(width_m=0.2, peak_mps=-0.5))
-    vortex = stirred("water", 0.5, current=Vortex(core_m=0.1, peak_mps=0.5))
+    channel = stirred_scene("water", 0.5, current=Channel(width_m=0.2, peak_mps=-0.5))
+    vortex = stirred_scene("water", 0.5, current=Vortex(core_m=0.1, peak_mps=0.5))
     sheared_mps2 = 0.5 * 4 * 0.5 / 0.2
     history_n = 12 * 0.034**2 * math.sqrt(2 * math.pi * 998.2 * 1.0016e-3 * sheared_mps2 * 0.5)
     assert bound(channel, "current") == pytest.approx(
@@ -109,9 +109,9 @@ POOL = Box(size_m=(1.0, 0.4, 1.0))
     ids=["deep", "across", "above"],
 )
 def test_the_surface_is_called_for_where_the_ball_can_cross_it(depth_m, effects):
-    scene = stirred("water", 0.1, region=POOL, body=Body(density_kg_m3=998.2))
+    scene = stirred_scene("water", 0.1, region=POOL, body=Body(density_kg_m3=998.2))
     scene = scene.model_copy(update={"motion": scene.motion.model_copy(update={"depth_m": depth_m})})
-    assert set(taken(scene)) == effects
+    assert set(selected_effects(scene)) == effects
     if effects == {"buoyancy"}:
         assert bound(scene, "drag") == bound(scene, "added_mass") == bound(scene, "surface") == 0.0
         assert bound(scene, "buoyancy") == pytest.approx(998.2 * VOLUME_M3 * 9.80665)
@@ -143,7 +143,7 @@ scenes = st.builds(
 
 @pytest.mark.slow
 @given(scene=scenes)
-def test_the_sum_of_what_is_left_out_stays_within_the_target_and_nothing_more_would(scene):
+def test_omitted_effects_fill_the_target_without_exceeding_it(scene):
     verdicts = effect_verdicts(scene)
     total_n = sum(verdict.bound_n for verdict in verdicts)
     small = [verdict.bound_n for verdict in verdicts if not verdict.included or "carries" in verdict.why]
@@ -156,10 +156,10 @@ def test_the_sum_of_what_is_left_out_stays_within_the_target_and_nothing_more_wo
 
 @pytest.mark.slow
 @given(scene=scenes)
-def test_what_is_resolved_is_named_valid_and_final(scene):
+def test_a_resolved_scene_is_valid_and_final(scene):
     named = resolve(scene)
     assert Scene.model_validate(named.model_dump()) == named
-    assert list(named.liquids[0].effects) == taken(scene) == taken(named)
+    assert list(named.liquids[0].effects) == selected_effects(scene) == selected_effects(named)
     assert resolve(named) is named
 
 
@@ -198,5 +198,5 @@ def test_the_law_is_the_cheapest_within_the_target_at_every_speed(scene):
         ("water", 0.1, ["buoyancy"]),
     ],
 )
-def test_unsteady_drag_is_taken_up_to_re_1000(name, speed_mps, effects):
-    assert taken(stirred(name, speed_mps)) == effects
+def test_unsteady_drag_is_selected_up_to_re_1000(name, speed_mps, effects):
+    assert selected_effects(stirred_scene(name, speed_mps)) == effects

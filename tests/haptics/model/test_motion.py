@@ -16,21 +16,21 @@ HEADER = "t_s,x_m,y_m,z_m"
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 
 
-def written(tmp_path, text):
+def motion_file(tmp_path, text):
     file = tmp_path / "motion.csv"
     file.write_bytes(text.encode() if isinstance(text, str) else text)
     return file
 
 
 def problems(tmp_path, *rows, header=HEADER):
-    """Return what is wrong with a file of these rows, one line each."""
+    """Return the problems of a file with these rows, one line each."""
     with pytest.raises(ProtocolError) as caught:
-        read_motion(written(tmp_path, "\n".join([header, *rows]) + "\n"))
+        read_motion(motion_file(tmp_path, "\n".join([header, *rows]) + "\n"))
     return [str(problem) for problem in caught.value.problems]
 
 
 def test_positions_are_read_in_order(tmp_path):
-    motion = read_motion(written(tmp_path, f"{HEADER}\n0,1,2,3\n0.001,4,5,6e-1\n"))
+    motion = read_motion(motion_file(tmp_path, f"{HEADER}\n0,1,2,3\n0.001,4,5,6e-1\n"))
     assert motion.t_s.tolist() == [0, 0.001]
     assert motion.position_m.tolist() == [[1, 2, 3], [4, 5, 0.6]]
     assert motion.velocity_mps is None
@@ -63,7 +63,7 @@ def test_time_must_increase(tmp_path):
 
 @pytest.mark.parametrize("content", [None, b"\xff\xfe\x00", b't_s,"x'])
 def test_a_file_that_cannot_be_read_is_named(tmp_path, content):
-    file = tmp_path / "absent.csv" if content is None else written(tmp_path, content)
+    file = tmp_path / "absent.csv" if content is None else motion_file(tmp_path, content)
     with pytest.raises(StudyError, match=r"cannot read the motion file .*csv"):
         read_motion(file)
 
@@ -71,7 +71,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path, content):
 @pytest.mark.slow
 @settings(max_examples=examples(50), deadline=None)
 @given(values=arrays(float, st.tuples(st.integers(1, 20), st.just(3)), elements=numbers))
-def test_what_is_written_is_read_back_to_the_last_bit(tmp_path_factory, values):
+def test_written_columns_are_read_back_to_the_last_bit(tmp_path_factory, values):
     table = np.recarray(len(values), [(name, float) for name in HEADER.split(",")])
     table.t_s = np.arange(len(values)) / 3
     table.x_m, table.y_m, table.z_m = values.T
@@ -82,11 +82,11 @@ def test_what_is_written_is_read_back_to_the_last_bit(tmp_path_factory, values):
     assert motion.position_m.tobytes() == np.ascontiguousarray(values).tobytes()
 
 
-def test_on_error_nothing_is_written_and_what_was_there_stays(tmp_path):
+def test_a_failed_write_leaves_the_folder_unchanged(tmp_path):
     (tmp_path / "out.csv").mkdir()
     with pytest.raises(StudyError, match=r"out.csv cannot be written"):
         write_columns(tmp_path / "out.csv", np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
-    assert [found.name for found in tmp_path.iterdir()] == ["out.csv"]
+    assert [file.name for file in tmp_path.iterdir()] == ["out.csv"]
     with pytest.raises(StudyError, match="cannot be written"):
         write_columns(tmp_path / "absent" / "out.csv", np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
 
@@ -107,7 +107,7 @@ def test_a_motion_checks_itself(t_s, position_m, velocity_mps, message):
 
 
 def test_a_device_is_not_read(tmp_path):
-    """One such as /dev/zero has no end; a bad value is repeated in part."""
+    """Reading a device such as /dev/zero never ends; the error repeats only a part of a bad value."""
     with pytest.raises(StudyError, match="it is a device, so reading may never end"):
         read_motion(Path("/dev/null"))
     assert len("".join(problems(tmp_path, "x" * 5000 + ",0,0,0"))) < 300

@@ -16,17 +16,17 @@ OF_FULL = {"centre_m", "region", "depth_m", "velocity.kind", "velocity"}
 
 
 def leaves(value: BaseModel, place: str) -> Iterator[tuple[str, str, Any]]:
-    """Yield (table, field, value) of every number and word of a scene but its link; liquids are one table."""
-    for field, found in value:
+    """Yield (table, field, value) of every parameter of a scene except its link; liquids are one table."""
+    for field, value_of_field in value:
         if field == "link":
             continue
-        if isinstance(found, BaseModel):
-            yield from leaves(found, field)
+        if isinstance(value_of_field, BaseModel):
+            yield from leaves(value_of_field, field)
         elif field == "liquids":
-            for one in found:
-                yield from leaves(one, "liquid")
+            for liquid in value_of_field:
+                yield from leaves(liquid, "liquid")
         else:
-            yield place, field, found
+            yield place, field, value_of_field
 
 
 @pytest.mark.parametrize(
@@ -53,13 +53,13 @@ def leaves(value: BaseModel, place: str) -> Iterator[tuple[str, str, Any]]:
     ],
 )
 def test_override_sets_one_parameter_wherever_it_sits(name, text, where, value):
-    felt = FULL if name in OF_FULL else WATER
-    assert where(override_value(felt, name, text)) == value
-    assert where(felt) != value
+    base_scene = FULL if name in OF_FULL else WATER
+    assert where(override_value(base_scene, name, text)) == value
+    assert where(base_scene) != value
 
 
 @pytest.mark.parametrize(
-    "felt",
+    "base_scene",
     [
         FULL,
         FULL.model_copy(update={"velocity": Kalman()}),
@@ -68,19 +68,21 @@ def test_override_sets_one_parameter_wherever_it_sits(name, text, where, value):
         scene(POOL.model_copy(update={"current": Uniform(velocity_mps=(1, 2, 3))})),
     ],
 )
-def test_every_parameter_is_reached_by_its_table_and_most_by_their_name_alone(felt):
-    found = [(table, field) for table, field, _ in leaves(felt, "scene") if field not in {"id", "kind", "without"}]
+def test_every_parameter_is_reached_with_its_table_and_most_by_name_only(base_scene):
+    fields = [
+        (table, field) for table, field, _ in leaves(base_scene, "scene") if field not in {"id", "kind", "without"}
+    ]
     plain = []
-    for table, field, value in leaves(felt, "scene"):
+    for table, field, value in leaves(base_scene, "scene"):
         if field in {"id", "without"}:
             continue
         text = ",".join(map(str, value)) if isinstance(value, tuple) else value
         if text is not None:
-            assert override_value(felt, f"{table}.{field}", text) == felt
-        if [name for _, name in found].count(field) == 1 and text is not None:
-            assert override_value(felt, field, text) == felt
+            assert override_value(base_scene, f"{table}.{field}", text) == base_scene
+        if [name for _, name in fields].count(field) == 1 and text is not None:
+            assert override_value(base_scene, field, text) == base_scene
             plain.append(field)
-    shared = {field for _, field in found} - set(plain)
+    shared = {field for _, field in fields} - set(plain)
     assert shared <= {
         *("density_kg_m3", "law", "centre_m", "viscosity_pa_s", "speed_mps", "acceleration_mps2", "depth_m", "reach_m"),
         *("length", "scaling", "exponent", "decay", "axes", "samples", "tolerance_m", "filter_s", "smoothing_s"),
@@ -103,7 +105,7 @@ def test_tables_and_effects_are_judged_together():
 def test_override_reaches_every_liquid_that_has_the_parameter():
     mixed = scene(*WATER.liquids, *HONEY.liquids, *LIGHT_OIL.liquids)
     changed = override_value(mixed, "decay", 0.9)
-    assert [one.wake and one.wake.decay for one in changed.liquids] == [0.9, None, 0.9]
+    assert [liquid.wake and liquid.wake.decay for liquid in changed.liquids] == [0.9, None, 0.9]
 
 
 def test_parameters_that_belong_together_are_judged_together():
@@ -126,6 +128,6 @@ def test_parameters_that_belong_together_are_judged_together():
         ("drag", "1", "cannot set drag = 1: drag is a table of parameters: set one parameter by its name"),
     ],
 )
-def test_an_override_that_fails_says_why(name, value, message):
+def test_a_failed_override_states_its_reason(name, value, message):
     with pytest.raises(StudyError, match=message):
         override_value(WATER, name, value)

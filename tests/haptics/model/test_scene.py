@@ -53,14 +53,14 @@ def test_a_liquid_may_leave_the_choice_to_the_gate():
         ({"kind": "cylinder", "radius_m": 1, "height_m": 1}, (0.5 - 0.12 - 0.3, 0.5 + 0.12 - 0.3)),
     ],
 )
-def test_what_is_known_of_the_motion_follows_from_the_hand_unless_said(region, depth_m):
-    one = liquid(region=region)
-    felt = scene(one, scale=3, origin_m=(0, 0.3, 0))
-    motion = felt.motion_in(one)
+def test_the_motion_box_follows_from_the_hand_unless_stated(region, depth_m):
+    medium = liquid(region=region)
+    liquid_scene = scene(medium, scale=3, origin_m=(0, 0.3, 0))
+    motion = liquid_scene.motion_in(medium)
     assert (motion.speed_mps, motion.acceleration_mps2) == pytest.approx((0.9, 9.0))
     assert motion.depth_m == (None if depth_m is None else pytest.approx(depth_m))
-    said = MotionBox(speed_mps=1, acceleration_mps2=2, depth_m=(-1, 3))
-    assert felt.model_copy(update={"motion": said}).motion_in(one) == said
+    stated = MotionBox(speed_mps=1, acceleration_mps2=2, depth_m=(-1, 3))
+    assert liquid_scene.model_copy(update={"motion": stated}).motion_in(medium) == stated
 
 
 def test_liquids_need_ids_of_their_own_and_a_scene_takes_eight():

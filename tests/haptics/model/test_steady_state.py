@@ -26,8 +26,8 @@ def scene_of(name, scale, law="brown-lawler"):
     return Scene(scale=scale, liquids=(liquid,))
 
 
-def sent(scene, hand_mps, lasting_s=1):
-    """Return the force [N] and the limiters after an even motion of the hand, a second by default."""
+def simulated_force(scene, hand_mps, lasting_s=1):
+    """Return the force [N] and the limiters after a uniform motion of the hand of ``lasting_s``."""
     t_s = np.arange(1000 * lasting_s) / 1000
     x_m = scene.scale * hand_mps * t_s
     table = simulate(scene, Motion(t_s, np.column_stack([x_m, 0 * x_m, 0 * x_m])))
@@ -38,10 +38,10 @@ def sent(scene, hand_mps, lasting_s=1):
 @pytest.mark.parametrize("name", LIQUIDS)
 @pytest.mark.parametrize("scale", [1, 3, 10])
 @pytest.mark.parametrize("hand_mps", [0.02, 0.1, 0.25, 0.6])
-def test_the_predicted_force_is_what_the_servo_sends(name, scale, hand_mps):
+def test_the_predicted_force_equals_the_force_that_the_servo_sends(name, scale, hand_mps):
     for law in ("constant", "schiller-naumann", "haider-levenspiel", "brown-lawler"):
         predicted = steady_force(scene_of(name, scale, law), hand_mps)
-        force_n, limiters = sent(scene_of(name, scale, law), hand_mps)
+        force_n, limiters = simulated_force(scene_of(name, scale, law), hand_mps)
         assert predicted.force_n == pytest.approx(force_n, rel=1e-6)
         acted = {LIMITER_NORM: "norm", LIMITER_SLOPE: "slope"}.get(limiters & (LIMITER_NORM | LIMITER_SLOPE))
         if limiters & LIMITER_NORM and limiters & LIMITER_SLOPE:
@@ -55,7 +55,7 @@ def test_unsteady_drag_reaches_the_predicted_force_once_its_history_is_over(name
     liquid = Liquid(id=name, density_kg_m3=890, viscosity_pa_s={"gear_oil": 0.35, "honey": 10, "tar": 100}[name])
     scene = Scene(scale=3, liquids=(liquid.model_copy(update={"effects": ("unsteady_drag",)}),))
     predicted = steady_force(scene)
-    force_n, limiters = sent(scene, 0.1, lasting_s=30)
+    force_n, limiters = simulated_force(scene, 0.1, lasting_s=30)
     assert predicted.force_n == pytest.approx(force_n, rel=0.01)
     assert (predicted.limit == "slope") == bool(limiters & LIMITER_SLOPE)
     assert (predicted.limit == "slope") == (name == "tar")

@@ -1,4 +1,4 @@
-"""A servo on a virtual clock with the device that tests steer."""
+"""A servo on a virtual clock, with a device that tests control."""
 
 import pytest
 

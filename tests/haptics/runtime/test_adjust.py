@@ -1,4 +1,4 @@
-"""Numbers changed under the hand: what moves goes on, the force never steps, and no more comes back than was put in."""
+"""Parameters changed during a motion: the motion continues, the force has no step, and no energy is added."""
 
 from random import Random
 
@@ -46,24 +46,24 @@ def going_round(scene: Scene) -> tuple[Servo, ScriptedDevice]:
     return servo, device
 
 
-def newest(servo: Servo, ticks: int) -> np.ndarray:
+def newest_samples(servo: Servo, ticks: int) -> np.ndarray:
     written = int(servo.telemetry.written[0])
     return servo.telemetry.ring[written - ticks : written].copy()
 
 
 def test_the_same_numbers_change_nothing_but_the_serial() -> None:
-    (one, first), (other, second) = going_round(WATER), going_round(WATER)
+    (adjusted, first), (untouched, second) = going_round(WATER), going_round(WATER)
     for _ in range(10):
-        assert one.adjust(WATER) > 1
-        one.advance(50)
-    other.advance(500)
-    ours, theirs = newest(one, 500), newest(other, 500)
+        assert adjusted.adjust(WATER) > 1
+        adjusted.advance(50)
+    untouched.advance(500)
+    ours, theirs = newest_samples(adjusted, 500), newest_samples(untouched, 500)
     assert set(theirs.scene) == {1}
     assert list(ours.scene[::50]) == list(range(2, 12))
     for name in ("velocity_mps", "wake_mps", "force_n", "device_force_n", "limiters"):
         assert np.array_equal(ours[name], theirs[name]), name
     assert np.linalg.norm(ours.wake_mps, axis=1).min() > 0.5
-    for servo, device in ((one, first), (other, second)):
+    for servo, device in ((adjusted, first), (untouched, second)):
         servo.stop()
         device.close()
 
@@ -71,10 +71,10 @@ def test_the_same_numbers_change_nothing_but_the_serial() -> None:
 @pytest.mark.parametrize("name", NUMBERS)
 def test_a_number_is_felt_by_the_next_tick_and_the_wake_goes_on(name: str) -> None:
     servo, device = going_round(WATER)
-    before = newest(servo, 1)[0]
+    before = newest_samples(servo, 1)[0]
     servo.adjust(override_all(WATER, {name: NUMBERS[name]}))
     servo.advance(300)
-    after = newest(servo, 300)
+    after = newest_samples(servo, 300)
     assert set(after.scene) == {2}
     assert not (after.limiters & LIMITER_FADE).any()
     whole = np.concatenate([[before.device_force_n], after.device_force_n])
@@ -87,12 +87,12 @@ def test_a_number_is_felt_by_the_next_tick_and_the_wake_goes_on(name: str) -> No
 
 
 @pytest.mark.parametrize("name", OTHERWISE)
-def test_what_a_state_was_made_with_cannot_be_adjusted(name: str) -> None:
+def test_parameters_that_shape_the_state_cannot_be_adjusted(name: str) -> None:
     servo, device = going_round(WATER)
     with pytest.raises(StudyError, match="load the scene instead"):
         servo.adjust(override_all(WATER, {name: OTHERWISE[name]}))
     servo.advance(1)
-    assert newest(servo, 1)[0].scene == 1
+    assert newest_samples(servo, 1)[0].scene == 1
     servo.rest()
     servo.advance(1)
     assert not servo.may_adjust(WATER)
@@ -106,12 +106,12 @@ def test_what_a_state_was_made_with_cannot_be_adjusted(name: str) -> None:
 def test_however_the_numbers_are_thrown_about_the_hand_gets_back_no_more_than_it_put_in(
     steps: list[tuple[float, int]],
 ) -> None:
-    """E ≥ −1 mJ − F R, F and R being the strongest force and the longest step: as without a change."""
+    """E ≥ −1 mJ − F R, with the strongest force F and the longest step R, as without a change."""
     servo, device = going_round(WATER)
     for density_kg_m3, ticks in steps:
         servo.adjust(override_all(WATER, {"density_kg_m3": density_kg_m3}))
         servo.advance(ticks)
-    rows = newest(servo, 2500 + sum(ticks for _, ticks in steps))
+    rows = newest_samples(servo, 2500 + sum(ticks for _, ticks in steps))
     force_n, place_m = rows.device_force_n, rows.position_m
     work_j = np.cumsum(-np.einsum("ij,ij->i", force_n[:-1], np.diff(place_m, axis=0)))
     most_j = np.linalg.norm(force_n, axis=1).max() * np.linalg.norm(np.diff(place_m, axis=0), axis=1).max()
@@ -129,7 +129,7 @@ def test_a_scene_and_numbers_handed_over_in_one_tick_are_both_taken() -> None:
     servo.load(oil)
     servo.adjust(override_all(oil, {"force_limit_n": 0.3}))
     servo.advance(600)
-    after = newest(servo, 600)
+    after = newest_samples(servo, 600)
     assert set(after.scene) == {4}
     assert after.limiters[0] & LIMITER_FADE
     assert np.linalg.norm(after.device_force_n, axis=1).max() == pytest.approx(0.3)
@@ -142,6 +142,6 @@ def test_a_stopped_force_stays_stopped() -> None:
     servo.stop_force()
     servo.adjust(override_all(WATER, {"density_kg_m3": 9000.0}))
     servo.advance(200)
-    assert not newest(servo, 200).device_force_n.any()
+    assert not newest_samples(servo, 200).device_force_n.any()
     servo.stop()
     device.close()

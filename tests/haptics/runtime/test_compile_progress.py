@@ -1,4 +1,4 @@
-"""The share of the force model that is compiled is said while it is; nothing where all is stored."""
+"""Compilation reports its progress, and nothing if all functions are in the cache."""
 
 import os
 import subprocess
@@ -30,7 +30,7 @@ print(counter.compiled)
 """
 
 
-def test_each_compiled_function_is_counted_and_a_stored_one_is_not() -> None:
+def test_compiled_functions_are_counted_but_not_cached_ones() -> None:
     @numba.njit  # not stored on the disk, where a second run would find it
     def inner(x):
         return x + 1
@@ -51,14 +51,14 @@ def test_each_compiled_function_is_counted_and_a_stored_one_is_not() -> None:
 
 
 def test_the_types_of_a_model_have_the_names_by_which_they_are_pickled() -> None:
-    """Stored code is found by the types of its arguments; one that is pickled by value differs in each process."""
+    """Cached code is found by its argument types; a type that is pickled by value differs in each process."""
     model = pack(load_scene("demo", "thick"))
     for kind in (type(model), type(model.rows)):
         assert getattr(sys.modules[kind.__module__], kind.__qualname__, None) is kind
 
 
 @pytest.mark.nightly
-def test_opening_the_first_session_compiles_about_what_is_expected_and_the_second_nothing(tmp_path: Path) -> None:
+def test_the_first_session_compiles_the_expected_share_and_the_second_nothing(tmp_path: Path) -> None:
     command = [sys.executable, "-c", OPENED]
     own = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_CPU_NAME": "generic"}
     first, second = (

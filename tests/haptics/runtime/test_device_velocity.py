@@ -1,4 +1,4 @@
-"""What a device measures besides position: taken over by the servo, and its velocity in place of the estimator."""
+"""Measured values of a device besides position: the servo records them and uses the velocity for the estimate."""
 
 import numba
 import numpy as np
@@ -37,8 +37,8 @@ def samples_of(probe, ticks=500):
     return reader.read(), servo
 
 
-def measuring(velocity_mps=(0.1, 0.2, -0.3), dynamics=MEASURING):
-    """Return a probe that says another velocity than that of its positions."""
+def measuring_probe(velocity_mps=(0.1, 0.2, -0.3), dynamics=MEASURING):
+    """Return a probe that reports a velocity other than that of its positions."""
     probe = Probe(velocity_mps=(0.2, 0.0, 0.0), dynamics=dynamics)
     probe.state.measured = MEASURED_VELOCITY
     probe.state.measured_mps = velocity_mps
@@ -46,7 +46,7 @@ def measuring(velocity_mps=(0.1, 0.2, -0.3), dynamics=MEASURING):
 
 
 def test_measured_velocity_is_used_in_place_of_the_estimator():
-    samples, servo = samples_of(measuring())
+    samples, servo = samples_of(measuring_probe())
     assert samples.velocity_mps == pytest.approx(np.tile(SCENE.scale * np.array([0.1, 0.2, -0.3]), (500, 1)))
     assert samples.device_velocity_mps[-1].tolist() == [0.1, 0.2, -0.3]
     assert servo.describe()["estimator"] == "device"
@@ -56,7 +56,7 @@ def test_measured_velocity_is_used_in_place_of_the_estimator():
 
 @pytest.mark.parametrize("dynamics", [UNKNOWN, Dynamics(velocity_lag_s=8e-3)], ids=["undeclared", "too late"])
 def test_velocity_that_is_not_declared_or_lags_too_much_is_recorded_and_not_used(dynamics):
-    samples, servo = samples_of(measuring(dynamics=dynamics))
+    samples, servo = samples_of(measuring_probe(dynamics=dynamics))
     assert samples.velocity_mps[-1] == pytest.approx([SCENE.scale * 0.2, 0.0, 0.0])
     assert samples.device_velocity_mps[-1].tolist() == [0.1, 0.2, -0.3]
     assert servo.describe()["estimator"] == "scene"
@@ -68,7 +68,7 @@ def test_velocity_that_is_not_declared_or_lags_too_much_is_recorded_and_not_used
     ids=["missing", "NaN", "impossible"],
 )
 def test_sample_without_a_believable_velocity_is_refused_and_the_force_ends(measured, velocity_mps):
-    probe = measuring()
+    probe = measuring_probe()
     servo = Servo(probe, clock=VirtualClock())
     servo.load(SCENE)
     servo.advance(500)
@@ -82,7 +82,7 @@ def test_sample_without_a_believable_velocity_is_refused_and_the_force_ends(meas
     assert "sent no usable data" in servo.fault
 
 
-def test_what_is_not_measured_is_zero_whatever_the_record_holds():
+def test_unmeasured_values_are_zero_whatever_the_record_holds():
     probe = Probe()
     probe.state.measured_mps, probe.state.orientation, probe.state.gripper_m = 0.1, 0.5, 0.02
     probe.state.clock_ahead_ns = 7
@@ -99,7 +99,7 @@ def test_what_is_not_measured_is_zero_whatever_the_record_holds():
 
 
 def test_tick_with_a_measured_velocity_is_recomputed_to_the_last_bit():
-    samples, _ = samples_of(measuring())
+    samples, _ = samples_of(measuring_probe())
     again, _ = recomputed(samples, SCENE, MEASURING)
     for name in ("velocity_mps", "force_n", "command_n", "device_force_n", "limiters"):
         assert np.array_equal(again[name], samples[name]), name

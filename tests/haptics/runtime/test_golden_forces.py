@@ -44,32 +44,32 @@ SCALARS = ("permitted_n", "withheld_n", "delay_ticks", "limiters", "status")
 
 
 def follow(hand: Hand, mirror: Any = 1.0) -> Any:
-    """Return the samples along the stroke, or its mirror image, with what goes wrong on the way."""
+    """Return the samples along the stroke, or its mirror image, with faults on the way."""
     places, samples = 1.3 * stroke(4 * TICKS)[3 * TICKS :] * mirror, []
     for number, place_m in enumerate(places[:TICKS]):
-        given: Any = place_m
+        sample_m: Any = place_m
         late_ns = 0
         if number in range(44, 53) or number in (60, 61):
-            given = None  # no new sample: the force fades, then none for two ticks
+            sample_m = None  # no new sample: the force fades, then none for two ticks
         elif number == 72:
-            given = place_m + np.array([0.0, 0.05, 0.0])
+            sample_m = place_m + np.array([0.0, 0.05, 0.0])
         elif number == 74:
-            given = np.array([0.0, np.nan, 0.0])
+            sample_m = np.array([0.0, np.nan, 0.0])
         elif number in range(84, 92):
-            given = places[84]  # a rest
+            sample_m = places[84]  # a rest
         elif number in (97, 98):
             late_ns = (2 + 9 * (number == 98)) * TICK_NS
         elif number > 130:
-            given = place_m + np.array([0.03, 0.0, 0.0]) * mirror  # the device's zero is another one
-        samples.append(hand.tick(given, after_ns=TICK_NS + late_ns).copy())
+            sample_m = place_m + np.array([0.03, 0.0, 0.0]) * mirror  # the device's zero is another one
+        samples.append(hand.tick(sample_m, after_ns=TICK_NS + late_ns).copy())
     return np.array(samples)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_whatever_goes_wrong_the_force_is_safe_and_the_same_again(name: str) -> None:
-    scene, given = CASES[name]
-    samples = follow(Hand(scene, **given))
-    again = follow(Hand(scene, **given))
+    scene, options = CASES[name]
+    samples = follow(Hand(scene, **options))
+    again = follow(Hand(scene, **options))
     size_n = np.linalg.norm(samples["command_n"], axis=1)
     assert np.isfinite(size_n).all()
     assert (size_n <= scene.force_limit_n * (1 + 1e-9)).all()
@@ -85,9 +85,9 @@ def test_whatever_goes_wrong_the_force_is_safe_and_the_same_again(name: str) -> 
 
 @pytest.mark.parametrize("name", [name for name in CASES if name.partition(" ")[2] in MIRRORED])
 def test_a_mirrored_motion_is_answered_by_the_mirrored_force(name: str) -> None:
-    scene, given = CASES[name]
+    scene, options = CASES[name]
     mirror = np.array([-1.0, 1.0, 1.0])
-    forces = follow(Hand(scene, **given))["command_n"], follow(Hand(scene, **given), mirror)["command_n"]
+    forces = follow(Hand(scene, **options))["command_n"], follow(Hand(scene, **options), mirror)["command_n"]
     assert np.allclose(forces[0], mirror * forces[1], rtol=1e-6, atol=1e-9)
 
 
@@ -113,7 +113,9 @@ def test_which_scenes_keep_their_state(pytestconfig: pytest.Config) -> None:
     for name, scene in bases.items():
         kept = [what for what, other in variants(scene).items() if is_built_alike(scene, other)]
         estimators = [
-            one for one in ESTIMATOR_NAMES if is_built_alike(scene, with_parameter(scene, "velocity.kind", one))
+            estimator
+            for estimator in ESTIMATOR_NAMES
+            if is_built_alike(scene, with_parameter(scene, "velocity.kind", estimator))
         ]
         others = [what for what, other in bases.items() if what != name and is_built_alike(scene, other)]
         lines.append(f"{name}: {', '.join(kept)} | {', '.join(estimators)} | {', '.join(others)}")

@@ -9,7 +9,7 @@ from tests.haptics.scenes import WATER, scene
 # The settings of the thesis' figures 3 to 8.
 
 
-def test_every_row_is_a_tick_of_its_own_time_not_of_the_rate():
+def test_every_row_is_a_tick_at_its_own_time():
     t_s = np.array([0.0, 0.001, 0.004, 0.5])
     motion = Motion(t_s, np.column_stack([t_s, 0 * t_s, 0 * t_s]))
     v = simulate(scene(), motion).vx_mps

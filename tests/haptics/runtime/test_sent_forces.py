@@ -18,7 +18,7 @@ from tests.haptics.running import recomputed
 from tests.haptics.scenes import HONEY
 
 
-def felt(probe, ticks=1000):
+def honey_samples(probe, ticks=1000):
     """Return the samples of a servo that presents honey to a moving probe."""
     servo = Servo(probe, clock=VirtualClock())
     servo.load(HONEY)
@@ -30,10 +30,10 @@ def felt(probe, ticks=1000):
 
 def test_telemetry_and_passivity_observer_take_the_force_that_the_device_sent():
     probe = Probe()
-    whole = felt(probe)
+    whole = honey_samples(probe)
     probe = Probe()
     probe.state.share_sent = 0.25
-    samples = felt(probe)
+    samples = honey_samples(probe)
     pushed = np.linalg.norm(samples.command_n, axis=1) > 0.1
     assert pushed.sum() > 500
     assert samples.device_force_n[pushed] == pytest.approx(0.25 * samples.command_n[pushed], abs=2.0**-15)
@@ -48,7 +48,7 @@ def test_telemetry_and_passivity_observer_take_the_force_that_the_device_sent():
 def test_a_tick_is_recomputed_from_the_delivered_force_to_the_last_bit():
     probe = Probe(velocity_mps=(0.3, 0.0, 0.1))
     probe.state.share_sent = 0.5
-    samples = felt(probe)
+    samples = honey_samples(probe)
     again, _ = recomputed(samples)
     for name in ("command_n", "device_force_n", "permitted_n", "withheld_n"):
         assert np.array_equal(again[name], samples[name]), name
@@ -62,8 +62,8 @@ def balances(servo):
 
 
 def test_the_observer_takes_the_least_favourable_force_of_saturated_motors_and_a_replay_repeats_it():
-    """Braking, the motors may have given nothing; pushing the hand on, all."""
-    taken = {}
+    """While braking, the motors may have given no force; while pushing the hand, all of it."""
+    results = {}
     for name, saturates, share in (("obeyed", 0, 1.0), ("nothing", 0, 0.0), ("saturated", 1, 1.0)):
         probe = Probe(velocity_mps=(0.3, 0.0, 0.1))
         probe.state.saturates, probe.state.share_sent = saturates, share
@@ -75,14 +75,14 @@ def test_the_observer_takes_the_least_favourable_force_of_saturated_motors_and_a
         probe.state.velocity_mps = (-0.3, 0.0, -0.1)
         probe.state.began_ns += 1_200_000_000  # from the same place back
         servo.advance(3)
-        taken[name] = braked, balances(servo), reader.read(), servo.loop.safety[0].copy()
-    assert (taken["obeyed"][0] > 1e-5).all()
-    assert taken["saturated"][0] == pytest.approx(taken["nothing"][0], abs=1e-9)
-    fallen = {name: it[1] - it[0] for name, it in taken.items()}
+        results[name] = braked, balances(servo), reader.read(), servo.loop.safety[0].copy()
+    assert (results["obeyed"][0] > 1e-5).all()
+    assert results["saturated"][0] == pytest.approx(results["nothing"][0], abs=1e-9)
+    fallen = {name: it[1] - it[0] for name, it in results.items()}
     assert fallen["saturated"][1] == pytest.approx(fallen["obeyed"][1], abs=1e-6)
     assert fallen["saturated"][1] < -1e-5
 
-    samples, left = taken["saturated"][2:]
+    samples, left = results["saturated"][2:]
     assert (samples.limiters & LIMITER_SATURATED != 0).all()
     assert (samples.device_force_n == samples.command_n).all()
     again, safety = recomputed(samples)
@@ -92,7 +92,7 @@ def test_the_observer_takes_the_least_favourable_force_of_saturated_motors_and_a
 
 @pytest.mark.parametrize(("delay_s", "expected"), [(None, 1), (0.0, 0), (0.9e-3, 1), (1e-3, 1), (1.2e-3, 2)])
 def test_the_believed_delay_is_the_measured_one_in_whole_ticks(delay_s, expected):
-    samples = felt(Probe(dynamics=Dynamics(delay_s)), ticks=2)
+    samples = honey_samples(Probe(dynamics=Dynamics(delay_s)), ticks=2)
     assert samples.delay_ticks.tolist() == [expected, expected]
 
 
@@ -136,7 +136,7 @@ def test_the_tick_of_a_lost_device_is_recomputed(lost, reads):
     probe = Probe(velocity_mps=(0.3, 0.0, 0.1))
     probe.state.share_sent, probe.state.held_when_lost_n = 0.5, 2.0
     probe.state[lost] = reads
-    samples = felt(probe)
+    samples = honey_samples(probe)
     assert samples.status[-1] == STATUS_DEVICE_LOST
     again, _ = recomputed(samples)
     assert np.array_equal(again.device_force_n, samples.device_force_n)

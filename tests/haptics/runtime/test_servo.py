@@ -99,7 +99,7 @@ def test_a_wake_longer_than_the_servo_has_room_for_is_refused(probe):
         servo.load(WATER)
 
 
-def test_the_force_stays_within_what_the_device_bears(probe):
+def test_the_force_stays_within_the_limit_of_the_device(probe):
     probe.force_limit_n = 1.5
     servo = Servo(probe, clock=VirtualClock())
     servo.load(HONEY)
@@ -126,7 +126,7 @@ def test_a_gap_is_passed_over_and_not_made_up_for(probe):
     assert (np.diff(samples.time_ns) >= 600_000).all()
 
 
-def test_a_reader_that_comes_too_late_counts_what_it_missed(servo):
+def test_a_late_reader_counts_the_samples_that_it_missed(servo):
     reader = servo.telemetry.reader()
     ticks = HISTORY + 5000
     servo.advance(ticks)

@@ -18,14 +18,14 @@ from study_app.haptics.model.layout import (
 from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.compiled import needs_servo
-from tests.haptics.running import felt, is_zero
+from tests.haptics.running import bring_to_force, is_zero
 from tests.haptics.scenes import HONEY, WATER
 
 pytestmark = needs_servo
 
 
 def test_a_force_stop_is_zero_on_the_next_tick(servo, probe):
-    felt(servo)
+    bring_to_force(servo)
     servo.stop_force()
     assert not servo.force_is_on
     servo.advance(1)
@@ -36,7 +36,7 @@ def test_a_force_stop_is_zero_on_the_next_tick(servo, probe):
 
 
 def test_the_stop_button_of_the_device_is_heard_by_the_servo_itself(servo, probe):
-    felt(servo)
+    bring_to_force(servo)
     probe.state.buttons = BUTTON_STOP
     servo.advance(1)
     assert is_zero(probe.forces_n[-1])
@@ -47,7 +47,7 @@ def test_the_stop_button_of_the_device_is_heard_by_the_servo_itself(servo, probe
 
 
 def test_after_a_force_stop_the_force_fades_in_as_at_the_start(servo, probe):
-    felt(servo)
+    bring_to_force(servo)
     full = np.linalg.norm(probe.forces_n[-1])
     servo.stop_force()
     servo.advance(100)
@@ -60,7 +60,7 @@ def test_after_a_force_stop_the_force_fades_in_as_at_the_start(servo, probe):
 
 
 def test_a_force_stop_outlasts_a_change_of_scene(servo, probe):
-    felt(servo)
+    bring_to_force(servo)
     servo.stop_force()
     servo.load(WATER)
     servo.advance(200)
@@ -70,7 +70,7 @@ def test_a_force_stop_outlasts_a_change_of_scene(servo, probe):
 def test_an_exception_in_the_host_ends_in_zero_force(probe):
     def host():
         with Servo(probe, clock=VirtualClock()) as servo:
-            felt(servo)
+            bring_to_force(servo)
             raise RuntimeError("host")
 
     with pytest.raises(RuntimeError, match="host"):
@@ -81,7 +81,7 @@ def test_an_exception_in_the_host_ends_in_zero_force(probe):
 @pytest.mark.slow
 def test_a_servo_nobody_holds_ends_in_zero_force(probe):
     servo = Servo(probe, clock=VirtualClock())
-    felt(servo)
+    bring_to_force(servo)
     gone = weakref.ref(servo)
     del servo
     gc.collect()
@@ -90,7 +90,7 @@ def test_a_servo_nobody_holds_ends_in_zero_force(probe):
 
 
 def test_a_stopped_servo_starts_again_at_rest_and_fades_in(servo, probe):
-    felt(servo)
+    bring_to_force(servo)
     servo.stop()
     written = len(probe.forces_n)
     servo.advance(100)
@@ -106,7 +106,7 @@ def test_a_stopped_servo_starts_again_at_rest_and_fades_in(servo, probe):
 
 @pytest.mark.parametrize("way", ["lost_at_read", "lost_at_write"])
 def test_a_lost_device_ends_the_loop_in_zero_force(servo, probe, way):
-    felt(servo)
+    bring_to_force(servo)
     probe.state[way] = probe.state.reads + 11
     assert servo.advance(100) == 11
     assert is_zero(probe.forces_n[-1])
@@ -121,19 +121,19 @@ def test_a_lost_device_ends_the_loop_in_zero_force(servo, probe, way):
     servo.rest()
 
 
-def test_after_a_loss_the_servo_can_be_started_anew(servo, probe):
-    felt(servo)
+def test_after_a_loss_the_servo_can_be_restarted(servo, probe):
+    bring_to_force(servo)
     probe.state.lost_at_read = probe.state.reads + 1
     servo.advance(10)
     probe.state.lost_at_read = 1 << 60
     servo.stop()
     assert servo.advance(10) == 10
     assert servo.fault is None
-    felt(servo)
+    bring_to_force(servo)
 
 
 def test_a_device_without_news_for_50_ms_is_a_fault(servo, probe):
-    felt(servo)
+    bring_to_force(servo)
     probe.state.silent_from_read = probe.state.reads + 1
     assert servo.advance(1000) == 50
     assert servo.telemetry.latest().status == STATUS_STALE_FAULT
@@ -142,8 +142,8 @@ def test_a_device_without_news_for_50_ms_is_a_fault(servo, probe):
         servo.check()
 
 
-def test_a_force_that_is_no_number_is_never_written(servo, probe):
-    felt(servo)
+def test_a_non_finite_force_is_never_written(servo, probe):
+    bring_to_force(servo)
     for model in servo.loop.slots:
         model.liquids.drag.factor_kg_m = np.nan
     assert servo.advance(100) == 1
@@ -154,8 +154,8 @@ def test_a_force_that_is_no_number_is_never_written(servo, probe):
         servo.check()
 
 
-def test_one_position_that_is_no_number_is_passed_over(servo, probe):
-    felt(servo)
+def test_a_single_non_finite_position_is_skipped(servo, probe):
+    bring_to_force(servo)
     probe.state.bad_at_read = probe.state.reads + 5
     assert servo.advance(100) == 100
     assert servo.telemetry.latest().status == STATUS_OK

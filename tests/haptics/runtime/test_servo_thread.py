@@ -20,7 +20,7 @@ from tests.haptics.scenes import HONEY, WATER
 pytestmark = needs_servo
 
 
-def test_the_thread_ticks_while_python_computes_and_ends_when_told(probe):
+def test_the_thread_ticks_while_python_computes_and_ends_on_request(probe):
     with Servo(probe) as servo:
         reader = servo.telemetry.reader()
         assert servo.load(HONEY) == 1

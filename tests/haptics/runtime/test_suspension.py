@@ -1,4 +1,4 @@
-"""Ctrl-Z while something may push: it goes on, or its last force would stay."""
+"""Ctrl-Z while a device may push: the program continues, since otherwise its last force would stay."""
 
 import os
 import signal

@@ -27,7 +27,7 @@ def push(telemetry, count=1, *, position=None):
         telemetry.written[0] += 1
 
 
-def test_a_reader_gets_what_came_since_it_last_read_in_order():
+def test_a_reader_gets_the_new_samples_in_order():
     telemetry = Telemetry(64)
     push(telemetry, 5)
     reader = telemetry.reader()
@@ -45,14 +45,14 @@ def test_a_reader_gets_what_came_since_it_last_read_in_order():
 def test_every_sample_is_read_once_or_counted_as_dropped(bursts):
     telemetry = Telemetry(8)
     reader = telemetry.reader()
-    seen = []
+    ticks_read = []
     for burst in bursts:
         push(telemetry, burst)
         samples = reader.read()
         assert samples.size == min(burst, 7)  # the eighth slot is the writer's
-        seen += samples.tick.tolist()
-    assert len(seen) + reader.dropped == sum(bursts)
-    assert seen == sorted(set(seen))
+        ticks_read += samples.tick.tolist()
+    assert len(ticks_read) + reader.dropped == sum(bursts)
+    assert ticks_read == sorted(set(ticks_read))
 
 
 @kernel
@@ -76,18 +76,20 @@ def test_beside_a_racing_writer_every_sample_read_is_whole():
     reader = telemetry.reader()
     writer = threading.Thread(target=write_fast, args=(telemetry.ring, telemetry.written, count))
     writer.start()
-    seen, running = 0, True
+    read_count, running = 0, True
     while running:
         running = writer.is_alive()
         samples = reader.read()
-        assert samples.tick.tolist() == list(range(seen + reader.dropped, seen + reader.dropped + samples.size))
-        seen += samples.size
+        assert samples.tick.tolist() == list(
+            range(read_count + reader.dropped, read_count + reader.dropped + samples.size)
+        )
+        read_count += samples.size
         for name in ("position_m", "device_force_n"):
             assert (samples[name] == samples.tick[:, None]).all()
         assert (samples.status == samples.tick).all()
     writer.join()
-    assert seen > 0
-    assert seen + reader.dropped == count
+    assert read_count > 0
+    assert read_count + reader.dropped == count
 
 
 @pytest.mark.slow
@@ -113,7 +115,7 @@ def test_outside_the_history_the_nearest_sample_is_given_with_its_own_time():
     assert (position[0], moment) == (pytest.approx(13e-3), 13 * MS)
 
 
-def test_positions_that_are_no_numbers_are_passed_over():
+def test_non_finite_positions_are_skipped():
     telemetry = Telemetry(16)
     push(telemetry, 3)
     push(telemetry, 2, position=(np.nan, 0, 0))
@@ -152,14 +154,14 @@ def test_timing_tells_lateness_gap_and_deadlines_passed_over():
     lateness[50] = 0.4
     times = np.arange(100) + lateness
     times[50:] += 4  # deadlines 50 to 53 were passed over
-    seen = timing(ticks(times, lateness), 1000)
-    assert seen.overruns == 4
-    assert seen.worst_gap_s == pytest.approx(0.0054)
-    assert seen.lateness_p99_s == pytest.approx(np.percentile(lateness, 99) * 1e-3)
-    assert seen.rate_hz == pytest.approx(99 / 0.103)
+    result = timing(ticks(times, lateness), 1000)
+    assert result.overruns == 4
+    assert result.worst_gap_s == pytest.approx(0.0054)
+    assert result.lateness_p99_s == pytest.approx(np.percentile(lateness, 99) * 1e-3)
+    assert result.rate_hz == pytest.approx(99 / 0.103)
 
 
 @pytest.mark.parametrize("count", [0, 1])
 def test_too_few_samples_have_no_timing(count):
-    seen = timing(ticks(np.arange(count)), 1000)
-    assert (seen.ticks, seen.rate_hz, seen.worst_gap_s, seen.overruns) == (count, 0, 0, 0)
+    result = timing(ticks(np.arange(count)), 1000)
+    assert (result.ticks, result.rate_hz, result.worst_gap_s, result.overruns) == (count, 0, 0, 0)

@@ -39,8 +39,8 @@ def force_of(scene, motion):
     return np.column_stack([table.fx_n, table.fy_n, table.fz_n])
 
 
-def noisy(scene, motion, deviation_n, *, following=0.0, seed=SEED):
-    """Return the force (n, 3) and the noise of a sensor in the horizontal plane, of that correlation row to row."""
+def noisy_force(scene, motion, deviation_n, *, following=0.0, seed=SEED):
+    """Return the force (n, 3) with horizontal sensor noise of a given correlation between rows."""
     rng = np.random.default_rng(seed)
     noise = rng.standard_normal((len(motion.t_s), 3))
     for k in range(1, len(noise) if following else 0):
@@ -48,7 +48,7 @@ def noisy(scene, motion, deviation_n, *, following=0.0, seed=SEED):
     return force_of(scene, motion) + deviation_n * noise * [1, 0, 1]
 
 
-def slowed(motion, force_n, rows):
+def some_rows(motion, force_n, rows):
     """Return some rows of a measurement."""
     return Motion(motion.t_s[rows], motion.position_m[rows], velocity_mps=motion.velocity_mps[rows]), force_n[rows]
 

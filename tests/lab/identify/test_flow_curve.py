@@ -37,20 +37,20 @@ def measured(name, *, noise=0.01, rates=RATES, seed=5):
     return FlowCurve(rates, stresses * (1 + noise * np.random.default_rng(seed).standard_normal(len(rates))))
 
 
-def begun(name):
+def start_scene(name):
     return override_all(tank(name), {f"non_newtonian.{field}": value for field, value in STARTS[name].items()})
 
 
 @pytest.mark.parametrize("name", STARTS)
 def test_planted_parameters_are_recovered_from_a_rheometer_with_1_percent_noise(name):
-    found = fit_curve(begun(name), name, list(STARTS[name]), measured(name))
-    for field, value in found.values.items():
+    result = fit_curve(start_scene(name), name, list(STARTS[name]), measured(name))
+    for field, value in result.values.items():
         true = getattr(PRESETS[name][1], field)
         assert value == pytest.approx(true, rel=0.05)
-        lower, upper = found.intervals[field]
+        lower, upper = result.intervals[field]
         assert lower < true < upper
-    assert found.share == pytest.approx(0.01, rel=0.4)
-    assert found.warnings == ()
+    assert result.share == pytest.approx(0.01, rel=0.4)
+    assert result.warnings == ()
 
 
 def strokes():
@@ -71,17 +71,17 @@ def test_planted_parameters_are_recovered_from_strokes_with_noise_of_0_03_n(name
     force_n = force_of(tank(name), motion)
     force_n[:, 0] += 0.03 * np.random.default_rng(6).standard_normal(len(force_n))
     begin = override_all(tank(name), {f"non_newtonian.{field}": value for field, value in start.items()})
-    found = fit(begin, name, list(start), motion, force_n)
-    for field, value in found.values.items():
+    result = fit(begin, name, list(start), motion, force_n)
+    for field, value in result.values.items():
         assert value == pytest.approx(getattr(PRESETS[name][1], field), rel=0.05)
 
 
 def test_a_relaxation_time_does_not_change_a_flow_curve():
     curve = FlowCurve(RATES, 20 * RATES)
-    found = fit_curve(tank("slime"), "slime", ["zero_shear_viscosity_pa_s", "relaxation_time_s"], curve)
-    assert found.values["zero_shear_viscosity_pa_s"] == pytest.approx(20)
-    assert not found.distinguishable
-    (warning,) = found.warnings
+    result = fit_curve(tank("slime"), "slime", ["zero_shear_viscosity_pa_s", "relaxation_time_s"], curve)
+    assert result.values["zero_shear_viscosity_pa_s"] == pytest.approx(20)
+    assert not result.distinguishable
+    (warning,) = result.warnings
     assert warning.startswith(
         "relaxation_time_s does not affect the stress at these shear rates, so its initial value 0.3 was kept"
     )
@@ -94,18 +94,18 @@ THICKENING = ["zero_shear_viscosity_pa_s", "thickened_viscosity_pa_s", "onset_sh
 def test_a_liquid_that_hardly_thickens_or_thins_ends_at_equal_viscosities(least, most):
     """Viscosity by the shear rate, below 5 per s and above; the search starts from cornstarch's parameters."""
     stress_pa = np.where(RATES < 5, least, most) * RATES * (1 + 0.02 * np.random.default_rng(1).standard_normal(25))
-    found = fit_curve(tank("cornstarch"), "cornstarch", THICKENING, FlowCurve(RATES, stress_pa))
-    zero, thickened, _ = found.values.values()
+    result = fit_curve(tank("cornstarch"), "cornstarch", THICKENING, FlowCurve(RATES, stress_pa))
+    zero, thickened, _ = result.values.values()
     assert min(least, most) * 0.9 < zero <= thickened < max(least, most) * 1.1
     assert thickened < max(1.02, 1.1 * most / least) * zero
 
 
 def test_a_narrow_range_of_shear_rates_does_not_separate_the_parameters():
-    found = fit_curve(
-        begun("ketchup"), "ketchup", list(STARTS["ketchup"]), measured("ketchup", rates=np.geomspace(8, 12, 25))
+    result = fit_curve(
+        start_scene("ketchup"), "ketchup", list(STARTS["ketchup"]), measured("ketchup", rates=np.geomspace(8, 12, 25))
     )
-    assert any("cannot be distinguished by these shear rates" in warning for warning in found.warnings)
-    assert any("or measure a wider range of shear rates" in warning for warning in found.warnings)
+    assert any("cannot be distinguished by these shear rates" in warning for warning in result.warnings)
+    assert any("or measure a wider range of shear rates" in warning for warning in result.warnings)
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_a_narrow_range_of_shear_rates_does_not_separate_the_parameters():
         (["yield_stress_pa", "flow_index"], 2, "2 shear rates are too few for 2 parameters"),
     ],
 )
-def test_what_cannot_be_fitted_is_one_line(names, rows, said):
+def test_an_impossible_curve_fit_is_reported_in_one_line(names, rows, said):
     with pytest.raises(StudyError, match=said) as caught:
         fit_curve(tank("ketchup"), "ketchup", names, measured("ketchup", rates=RATES[:rows]))
     assert "\n" not in str(caught.value)
@@ -139,9 +139,9 @@ def identify(*words):
 def test_from_a_rheometer_file_to_a_preset(tmp_path):
     path = write_csv(tmp_path / "rheometer.csv", measured("ketchup"))
     fields = ",".join(STARTS["ketchup"])
-    shown = identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", fields, "--to", tmp_path / "out")
-    assert shown.exit_code == 0
-    assert "ketchup: 25 shear rates from 0.05 to 200 per s; residual 0.9 % of the stress (RMS)" in shown.output
+    result = identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", fields, "--to", tmp_path / "out")
+    assert result.exit_code == 0
+    assert "ketchup: 25 shear rates from 0.05 to 200 per s; residual 0.9 % of the stress (RMS)" in result.output
     written = load_scene(tmp_path / "out" / "ketchup.toml", "ketchup").liquids[0].non_newtonian
     for field in STARTS["ketchup"]:
         assert getattr(written, field) == pytest.approx(getattr(PRESETS["ketchup"][1], field), rel=0.05)
@@ -157,8 +157,8 @@ def test_from_a_rheometer_file_to_a_preset(tmp_path):
     assert (tmp_path / "out" / "ketchup-fit.png").stat().st_size > 10_000
 
 
-def test_the_figure_of_a_flow_curve_names_what_was_measured_and_what_is_fitted():
-    result = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), measured("ketchup", noise=0.2))
+def test_the_figure_of_a_flow_curve_labels_measurement_and_fit():
+    result = fit_curve(start_scene("ketchup"), "ketchup", list(STARTS["ketchup"]), measured("ketchup", noise=0.2))
     above, below = preset.figures.draw_curve(result).axes
     curves = {line.get_label(): line.get_xydata().T for line in above.lines}
     assert (curves["measured"] == [RATES, result.curve.stress_pa]).all()
@@ -202,7 +202,7 @@ def test_a_fit_does_not_depend_on_the_order_of_rows(gap):
     ]
     curves = [FlowCurve(curve.rate_per_s[order], curve.stress_pa[order]) for order in orders]
     fields = list(STARTS["ketchup"])
-    first, *others = (fit_curve(begun("ketchup"), "ketchup", fields, ordered) for ordered in curves)
+    first, *others = (fit_curve(start_scene("ketchup"), "ketchup", fields, ordered) for ordered in curves)
     for other in others:
         assert (other.values, other.intervals, other.autocorrelation) == (
             first.values,
@@ -213,24 +213,24 @@ def test_a_fit_does_not_depend_on_the_order_of_rows(gap):
 
 
 def test_branches_that_differ_are_named_with_their_gap():
-    found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), loop(gap=0.2))
+    result = fit_curve(start_scene("ketchup"), "ketchup", list(STARTS["ketchup"]), loop(gap=0.2))
     said = "the largest and smallest stresses at repeated shear rates differ by 25 % of the stress"
-    assert any(warning.startswith(said) for warning in found.warnings)
-    low, high = found.intervals["yield_stress_pa"]
+    assert any(warning.startswith(said) for warning in result.warnings)
+    low, high = result.intervals["yield_stress_pa"]
     assert 1 < low < high < 30
 
 
-def test_branches_at_other_shear_rates_are_told_by_the_way_of_the_ramp():
+def test_branches_at_other_shear_rates_are_detected_by_the_direction_of_the_ramp():
     curve = loop(gap=0.2)
     rates = curve.rate_per_s * np.where(np.arange(44) < 22, 1.0, 1.05)
-    found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), FlowCurve(rates, curve.stress_pa))
-    assert any(it.startswith("the stresses at rising and falling shear rates differ by") for it in found.warnings)
+    result = fit_curve(start_scene("ketchup"), "ketchup", list(STARTS["ketchup"]), FlowCurve(rates, curve.stress_pa))
+    assert any(it.startswith("the stresses at rising and falling shear rates differ by") for it in result.warnings)
 
 
 def test_noise_makes_no_branches():
     for seed in range(20):
-        found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), loop(gap=0.0, seed=10 * seed))
-        assert not any("branch" in warning for warning in found.warnings)
+        result = fit_curve(start_scene("ketchup"), "ketchup", list(STARTS["ketchup"]), loop(gap=0.0, seed=10 * seed))
+        assert not any("branch" in warning for warning in result.warnings)
 
 
 def test_a_table_of_an_instrument_gives_the_numbers_of_a_plain_one(tmp_path):
@@ -241,9 +241,9 @@ def test_a_table_of_an_instrument_gives_the_numbers_of_a_plain_one(tmp_path):
     for text in (plain, plain.replace(",", ";").replace(".", ","), plain.replace(",", "\t")):
         path = tmp_path / "flow.csv"
         path.write_text(text, encoding="utf-8", newline="\n")
-        shown = identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", ",".join(STARTS["ketchup"]))
-        assert shown.exit_code == 0
-        said.append(shown.output)
+        result = identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", ",".join(STARTS["ketchup"]))
+        assert result.exit_code == 0
+        said.append(result.output)
     assert said[0] == said[1] == said[2]
 
 

@@ -1,4 +1,4 @@
-"""What a fit leaves behind, and the command from a file to a preset."""
+"""The files of a fit, and the command that turns a measurement into a preset."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from study_app.lab.identify import measured_force, preset
 from study_app.lab.identify.fit import Fit, fit
 from study_app.protocol.load import load_scene
 from tests.haptics.scenes import COMPILED
-from tests.lab.identify.measurements import OIL, REACH, REVERSE, TANK, force_of, noisy, write_csv
+from tests.lab.identify.measurements import OIL, REACH, REVERSE, TANK, force_of, noisy_force, write_csv
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory):
     """Return a fit and the file it was measured in."""
-    force_n = noisy(TANK, REVERSE, 0.02)
+    force_n = noisy_force(TANK, REVERSE, 0.02)
     path = write_csv(tmp_path_factory.mktemp("measured") / "tank.csv", REVERSE, force_n)
     start = override_all(TANK, {"drag_coefficient": 0.5})
     return fit(start, "tank", ["drag_coefficient", "scaling"], REVERSE, force_n), path
@@ -54,30 +54,30 @@ def fitted(tmp_path_factory):
 def test_the_preset_is_the_fitted_scene(scene, tmp_path):
     (liquid,) = scene.liquids
     (tmp_path / "measured.csv").write_text("t_s\n", encoding="utf-8", newline="\n")
-    found = fit(scene, liquid.id, ["density_kg_m3"], REACH, noisy(scene, REACH, 0.02))
+    fitted_scene = fit(scene, liquid.id, ["density_kg_m3"], REACH, noisy_force(scene, REACH, 0.02))
     file = tmp_path / "preset.toml"
-    file.write_text(preset.preset_file_text(found, tmp_path / "measured.csv"), encoding="utf-8", newline="\n")
-    assert load_scene(file, liquid.id) == found.scene.model_copy(update={"velocity": Kalman()})
-    assert found.scene != scene
+    file.write_text(preset.preset_file_text(fitted_scene, tmp_path / "measured.csv"), encoding="utf-8", newline="\n")
+    assert load_scene(file, liquid.id) == fitted_scene.scene.model_copy(update={"velocity": Kalman()})
+    assert fitted_scene.scene != scene
     for command in ("check", "scene"):
-        told = CliRunner().invoke(commands, [command, str(file)], catch_exceptions=False)
-        assert (told.exit_code, f"{liquid.id}: effects listed in the file" in told.output) == (0, True)
+        result = CliRunner().invoke(commands, [command, str(file)], catch_exceptions=False)
+        assert (result.exit_code, f"{liquid.id}: effects listed in the file" in result.output) == (0, True)
 
 
 @pytest.mark.slow
 def test_each_interval_is_beside_its_own_number_in_the_preset(fitted):
-    found, path = fitted
-    body = found.parameters[0]
+    fit_result, path = fitted
+    body = fit_result.parameters[0]
     density = replace(body, name="liquid.density_kg_m3", table="liquid", field="density_kg_m3")
     intervals = {"drag_coefficient": (0.41, 0.43), "scaling": (380.0, 421.0), density.name: (990.0, 1013.0)}
-    told = replace(
-        found,
-        parameters=(*found.parameters, density),
-        values=found.values | {density.name: 1000.0},
+    with_density = replace(
+        fit_result,
+        parameters=(*fit_result.parameters, density),
+        values=fit_result.values | {density.name: 1000.0},
         intervals=intervals,
     )
     noted, table = {}, ""
-    for line in preset.preset_file_text(told, path).splitlines():
+    for line in preset.preset_file_text(with_density, path).splitlines():
         key, _, interval = line.partition("# 95 %: ")
         table = line.strip("[]") if line.startswith("[") else table
         noted |= {f"{table}.{key.split()[0]}": interval} if interval else {}
@@ -90,14 +90,14 @@ def test_each_interval_is_beside_its_own_number_in_the_preset(fitted):
 
 @pytest.mark.slow
 def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
-    found, path = fitted
-    written = preset.write_fit(found, tmp_path / "new", path)
+    fit_result, path = fitted
+    written = preset.write_fit(fit_result, tmp_path / "new", path)
     assert sorted(it.name for it in written) == sorted(it.name for it in (tmp_path / "new").iterdir())
     rows = np.genfromtxt(tmp_path / "new" / "tank-fit.csv", delimiter=",", names=True)
-    force_n = force_of(found.scene, REVERSE)
+    force_n = force_of(fit_result.scene, REVERSE)
     for k, axis in enumerate("xyz"):
         assert rows[f"fitted_{axis}_n"] == pytest.approx(force_n[:, k], abs=1e-12)
-        assert rows[f"residual_{axis}_n"] == pytest.approx(found.measured_n[:, k] - force_n[:, k], abs=1e-12)
+        assert rows[f"residual_{axis}_n"] == pytest.approx(fit_result.measured_n[:, k] - force_n[:, k], abs=1e-12)
 
 
 @pytest.mark.slow
@@ -108,10 +108,10 @@ def test_the_figure_of_a_fit_shows_forces_and_residuals_of_each_axis(fitted):
     force, residual, along = preset.figures.draw_force(result).axes
     residual_n = result.measured_n - result.fitted_n
     for axes, named_n in ((force, result.fitted_n), (residual, residual_n)):
-        shown = {line.get_label(): line.get_ydata() for line in axes.lines if len(line.get_label()) == 1}
-        assert shown.keys() == {"xyz"[axis] for axis in result.axes}
+        curves = {line.get_label(): line.get_ydata() for line in axes.lines if len(line.get_label()) == 1}
+        assert curves.keys() == {"xyz"[axis] for axis in result.axes}
         for axis in result.axes:
-            assert shown["xyz"[axis]] == pytest.approx(named_n[:, axis])
+            assert curves["xyz"[axis]] == pytest.approx(named_n[:, axis])
     behind = [line.get_ydata() for line in force.lines if len(line.get_label()) > 1][1:]
     assert np.column_stack(behind) == pytest.approx(result.measured_n[:, list(result.axes)])
     along_n = residual_n @ [0.48, 0.6, -0.64]
@@ -170,12 +170,12 @@ def identify(*words):
 @pytest.mark.slow
 def test_from_a_file_to_a_preset(tmp_path):
     true = override_all(load_scene("rek2024", "honey"), {"drag_coefficient": 0.61})
-    path = write_csv(tmp_path / "honey.csv", REACH, noisy(true, REACH, 0.02), comment="# by hand\n")
-    told = identify(
+    path = write_csv(tmp_path / "honey.csv", REACH, noisy_force(true, REACH, 0.02), comment="# by hand\n")
+    result = identify(
         "--measured", path, "rek2024", "--liquid", "honey", "--fit", "drag_coefficient", "--to", tmp_path / "out"
     )
-    assert told.exit_code == 0
-    assert f"honey: {len(REACH.t_s)} rows over 1.8 s; residual 0.0283 N RMS, 1.2 % of the force" in told.output
+    assert result.exit_code == 0
+    assert f"honey: {len(REACH.t_s)} rows over 1.8 s; residual 0.0283 N RMS, 1.2 % of the force" in result.output
     written = load_scene(tmp_path / "out" / "honey.toml", "honey")
     assert written.body.drag_coefficient == pytest.approx(0.61, rel=0.01)
     assert written == true.model_copy(update={"body": written.body, "velocity": Kalman()})

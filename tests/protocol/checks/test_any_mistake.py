@@ -21,9 +21,9 @@ def mistakes(text: str) -> Iterator[str]:
     lines = text.split("\n")
     for number in range(len(lines)):
         yield "\n".join(lines[:number] + lines[number + 1 :])
-    for found in VALUE.finditer(text):
+    for match in VALUE.finditer(text):
         for wrong in WRONG:
-            yield text[: found.start()] + wrong + text[found.end() :]
+            yield text[: match.start()] + wrong + text[match.end() :]
 
 
 def is_refused(text: str) -> bool:

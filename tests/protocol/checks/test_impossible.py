@@ -29,14 +29,14 @@ HIDDEN = 'the ball is hidden, so participants cannot see its delay: write ball =
         ("viscosityjnd", "format = 2", "format = 2", "Mouse", {f"blocks.viscosity: {UNSEEN}"}),
     ],
 )  # fmt: skip
-def test_a_condition_that_nobody_can_perceive_is_warned_of(
+def test_an_imperceptible_condition_has_a_warning(
     study: str, old: str, new: str, device: str, expected: set[str]
 ) -> None:
     text = source_bytes(study).decode()
     assert old in text
-    found = warnings(parse(text.replace(old, new, 1).encode(), study), simulates=False, without_force=device)
+    warning_lines = warnings(parse(text.replace(old, new, 1).encode(), study), simulates=False, without_force=device)
     assert {
-        sentence for sentence in found if "not produce force" in sentence or "ball is hidden" in sentence
+        sentence for sentence in warning_lines if "not produce force" in sentence or "ball is hidden" in sentence
     } == expected
     assert expected.isdisjoint(warnings(load(study), simulates=False))
 
@@ -65,7 +65,7 @@ def test_a_region_is_reached_if_it_touches_the_tank_in_the_scene(region: Any, is
     assert _is_within_tank(SimpleNamespace(region=region), scene, device) == is_reached  # type: ignore[arg-type]
 
 
-def test_two_liquids_that_differ_in_their_names_and_unused_effects_alone_feel_the_same() -> None:
+def test_liquids_that_differ_only_in_names_and_unused_effects_feel_the_same() -> None:
     thin, thick = (load("demo").liquids[name] for name in list(load("demo").liquids)[:2])
     assert felt_numbers(thin) != felt_numbers(thick)
     assert felt_numbers(thin) == felt_numbers(thin.model_copy(update={"id": "another"}))

@@ -41,7 +41,7 @@ def study(edits: Iterable[tuple[str, str]]) -> Protocol:
         [HIDDEN],
     ],
 )
-def test_what_a_hint_suggests_passes_and_is_not_clipped(edits: list[tuple[str, str]]) -> None:
+def test_the_suggested_pace_passes_the_check_without_clipping(edits: list[tuple[str, str]]) -> None:
     protocol = study(edits)
     task = protocol.tasks["stir"]
     assert isinstance(task, Follow)
@@ -50,8 +50,8 @@ def test_what_a_hint_suggests_passes_and_is_not_clipped(edits: list[tuple[str, s
     scene = protocol.scene_for("damper")
     damper = scene.liquids[0]
     drag = damper.drag.model_copy(update={"damping_nspm": strongest})
-    felt: Scene = scene.model_copy(update={"liquids": (damper.model_copy(update={"drag": drag}),)})
-    assert steady_force(felt, FASTER * task.fastest_stroke((0.1, 0.06, 0.06)).speed_mps).limit is None
+    damped_scene: Scene = scene.model_copy(update={"liquids": (damper.model_copy(update={"drag": drag}),)})
+    assert steady_force(damped_scene, FASTER * task.fastest_stroke((0.1, 0.06, 0.06)).speed_mps).limit is None
 
 
 SWINGS = 4
@@ -63,10 +63,10 @@ def measured_share(velocity, rate_hz, frequency_hz):
     omega = 2 * np.pi * frequency_hz
     still = np.zeros_like(t_s)
     path = Motion(t_s, np.column_stack([0.1 * np.sin(omega * t_s), still, still]))
-    seen = simulate(scene(velocity=velocity, rate_hz=rate_hz, knee=UNBENT), path).vx_mps
+    velocities = simulate(scene(velocity=velocity, rate_hz=rate_hz, knee=UNBENT), path).vx_mps
     true = 0.1 * omega * np.cos(omega * t_s)
     whole = slice(round(2 * rate_hz / frequency_hz), None)
-    return np.sum(seen[whole] * true[whole]) / np.sum(true[whole] ** 2)
+    return np.sum(velocities[whole] * true[whole]) / np.sum(true[whole] ** 2)
 
 
 @pytest.mark.compiled
@@ -74,8 +74,8 @@ def measured_share(velocity, rate_hz, frequency_hz):
 @pytest.mark.parametrize("rate_hz", [500.0, 1000.0])
 @pytest.mark.parametrize("velocity", [Ewma(), Ewma(alpha=0.02), Raw()], ids=str)
 def test_the_share_is_that_of_the_estimator(velocity, rate_hz, frequency_hz):
-    found = passed_share(velocity, rate_hz, frequency_hz)
-    assert found == pytest.approx(measured_share(velocity, rate_hz, frequency_hz), abs=1e-3)
+    share = passed_share(velocity, rate_hz, frequency_hz)
+    assert share == pytest.approx(measured_share(velocity, rate_hz, frequency_hz), abs=1e-3)
 
 
 def test_the_usual_estimator_passes_99_percent_up_to_1_6_hz():

@@ -18,7 +18,10 @@ def test_an_omitted_key_has_its_default() -> None:
     assert (study.format, study.study.version, study.study.title) == (2, "1", {"en": "mixed"})
     assert study.study.languages == ("en",)
     assert study.device.workspace_mm == (100, 60, 60)
-    assert {name: one.liquid for name, one in study.conditions.items()} == {"thin": "thin", "thick": "thick"}
+    assert {name: condition.liquid for name, condition in study.conditions.items()} == {
+        "thin": "thin",
+        "thick": "thick",
+    }
     block = study.blocks["stir"]
     assert (block.part, block.code_prefix, block.task) == (1, "A", "explore")
     assert study.text(block.title, "en") == "Stir"
@@ -34,7 +37,10 @@ def test_names_of_trials_are_in_every_language_of_the_study() -> None:
 
 def bare(standard: Instrument, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
     items = [
-        {"id": item["id"], **({"options": [{"id": one["id"]} for one in item["options"]]} if "options" in item else {})}
+        {
+            "id": item["id"],
+            **({"options": [{"id": option["id"]} for option in item["options"]]} if "options" in item else {}),
+        }
         for item in standard.table["items"]
     ]
     return {"instrument": standard.name, "items": items}, {}
@@ -43,11 +49,11 @@ def bare(standard: Instrument, languages: tuple[str, ...]) -> tuple[dict[str, An
 @pytest.mark.parametrize("begin", [bare, Instrument.tables_in])
 @pytest.mark.parametrize("other", ["en", "nl", "de", "fr", "ar"])
 @pytest.mark.parametrize("name", Instrument.names())
-def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_rest(
+def test_a_study_inherits_the_texts_of_an_instrument_and_must_add_the_missing_ones(
     name: str, other: str, begin: Any
 ) -> None:
     languages, source = tuple(dict.fromkeys(("en", other))), Instrument(name).table
-    lacking = [one for one in languages if one not in source["languages"]]
+    lacking = [language for language in languages if language not in source["languages"]]
 
     def filled(table: dict[str, Any], scales: dict[str, Any]) -> tuple[Any, list[Fault]]:
         head = {"languages": languages}
@@ -64,29 +70,35 @@ def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_re
 
     table, scales = begin(Instrument(name), languages)
     for _ in range(3):
-        found, faults = filled(frozen(table), frozen(scales))
+        tables, faults = filled(frozen(table), frozen(scales))
         for fault in faults:
             words = [fault.missing_language] if fault.missing_language else lacking
             if fault.path[-1] != "instrument":
                 place: Any = table
                 for step in fault.path[2:-1]:
                     place = place[step]
-                place.setdefault(fault.path[-1], {}).update((one, f"own {one}") for one in words)
+                place.setdefault(fault.path[-1], {}).update((word, f"own {word}") for word in words)
                 continue
             table["intro"] = {**table.get("intro", {}), **dict.fromkeys(words, "own")}
-            for scale, one in source.get("scales", {}).items():
+            for scale, scale_source in source.get("scales", {}).items():
                 labels = scales.setdefault(Instrument(name).scale_name(scale), {"labels": {}})["labels"]
-                labels.update((language, [f"{language} {n}" for n in range(one["points"])]) for language in words)
+                labels.update(
+                    (language, [f"{language} {n}" for n in range(scale_source["points"])]) for language in words
+                )
         for scale in scales.values():
             known = next(iter(scale["labels"].values()))
-            scale["labels"].update((one, known) for one in languages if one not in scale["labels"])
+            scale["labels"].update((language, known) for language in languages if language not in scale["labels"])
     assert faults == []
-    form = Questionnaire.model_validate(found["questionnaires"]["form"])
+    form = Questionnaire.model_validate(tables["questionnaires"]["form"])
     assert set(form.scores) == set(source["scores"])
-    assert set(found["scales"]) == {Instrument(name).scale_name(one) for one in source.get("scales", {})}
+    assert set(tables["scales"]) == {Instrument(name).scale_name(scale) for scale in source.get("scales", {})}
     for item, known in zip(form.items, source["items"], strict=True):
         assert (item.id, item.kind_id) == (known["id"], known["kind"])
-        context = Context({one: Scale.model_validate(scale) for one, scale in found["scales"].items()}, None, "en")
+        context = Context(
+            {name_of_scale: Scale.model_validate(scale) for name_of_scale, scale in tables["scales"].items()},
+            None,
+            "en",
+        )
         if "from" in known:
             assert item.bounds(context) == (known["from"], known["to"])
         for language in languages:
@@ -107,7 +119,7 @@ def test_question_is_shown_by_the_answer_to_an_earlier_one() -> None:
     assert shown_questions(items, {"a": None}) == ("a",)
 
 
-def test_answer_to_a_hidden_question_shows_nothing() -> None:
+def test_an_answer_to_a_hidden_question_does_not_show_others() -> None:
     items = [view("a"), view("b", ShowIf(item="a", at_most=1)), view("c", ShowIf(item="b", values=5))]
     assert shown_questions(items, {"a": 2, "b": 5}) == ("a",)
     assert shown_questions(items, {"a": 1, "b": 5}) == ("a", "b", "c")

@@ -54,15 +54,15 @@ QUALITIES = {"force": 0.5, "resistance": 50.0, "push": 0.05, "peak": 5.0, "rough
 
 
 def opinions(person: Rater = EVEN, **qualities: float) -> dict[str, float]:
-    """Return the opinions on all items of a trial that differs in some qualities from the usual one."""
-    felt = QUALITIES | qualities
+    """Return the opinions on all items about a trial with some changed qualities."""
+    features = QUALITIES | qualities
     trial = TrialFeatures(
-        force_mean_n=felt["force"],
-        force_peak_n=felt["force"] * felt["peak"],
-        speed_rms_mps=math.sqrt(felt["force"] / felt["resistance"]),
-        push_share=felt["push"],
-        roughness_n=felt["rough"],
-        delay_s=felt["delay"],
+        force_mean_n=features["force"],
+        force_peak_n=features["force"] * features["peak"],
+        speed_rms_mps=math.sqrt(features["force"] / features["resistance"]),
+        push_share=features["push"],
+        roughness_n=features["rough"],
+        delay_s=features["delay"],
     )
     return judgements(OPINIONS, trial, person, lambda: 0.5)
 
@@ -168,14 +168,14 @@ def test_opinions_of_many_participants_are_those_of_drawn_trials_with_their_nois
         for force_n, delay_s in ((0.2, 0.01), (0.2, 0.4), (2.0, 0.01))
     )
     person = Rater(leaning=1, noise=0.8, strength=1, threshold_s=0.13)
-    drawn, noise = simulate_ratings(
+    ratings, noise = simulate_ratings(
         ["different", "like_slime"], [[early, late], [thick]], 600, person, np.random.default_rng(5)
     )
-    assert drawn.shape == noise.shape == (600, 2, 2)
+    assert ratings.shape == noise.shape == (600, 2, 2)
     expected = [judgements(["different", "like_slime"], trial, EVEN, lambda: 0.5) for trial in (early, late, thick)]
-    assert np.mean(drawn[:, 0, 0] == expected[0]["different"]) == pytest.approx(0.5, abs=0.08)
-    assert {*drawn[:, 0, 0]} == {expected[0]["different"], expected[1]["different"]}
-    assert {*drawn[:, 1, 1]} == {expected[2]["like_slime"]}
+    assert np.mean(ratings[:, 0, 0] == expected[0]["different"]) == pytest.approx(0.5, abs=0.08)
+    assert {*ratings[:, 0, 0]} == {expected[0]["different"], expected[1]["different"]}
+    assert {*ratings[:, 1, 1]} == {expected[2]["like_slime"]}
     assert noise.mean(axis=(0, 1, 2)) == pytest.approx(0, abs=0.06)
     assert noise.std() == pytest.approx(0.8, abs=0.05)
 
@@ -208,7 +208,7 @@ FELT = TrialFeatures(
     ],
 )
 @pytest.mark.parametrize("direction", ["up", "down"])
-def test_the_varied_number_determines_what_is_compared(
+def test_the_varied_number_determines_the_comparison(
     vary: str, sensed: float, noisy: float, notices: tuple[float, float], direction: str
 ) -> None:
     stimulus = f'"{vary}"\nlevel = "difference"\ndirection = "{direction}"'
@@ -260,7 +260,7 @@ def test_choices_are_the_strongest_or_the_weakest_interval_unless_attention_laps
 
 @pytest.mark.parametrize("delays", [False, True])
 @pytest.mark.parametrize("smallest", [False, True])
-def test_of_equal_intervals_a_preferred_one_or_the_last_answer_is_chosen(*, delays: bool, smallest: bool) -> None:
+def test_equal_intervals_are_decided_by_preference_or_the_last_answer(*, delays: bool, smallest: bool) -> None:
     design = default_design("3ifc")
     for person, choice in ((Person(criterion=3, lapse=0), "first"), (Person(repeats=3, lapse=0), "second")):
         comparison = Comparison(delays, smallest, Observer(person=person))
@@ -290,7 +290,7 @@ def test_each_simulated_trial_states_its_own_values() -> None:
     assert as_requested(Stimulated("oil", "viscosity_pa_s", 2.5)) == 2.5
 
 
-def test_trials_of_each_block_are_done_from_none_to_all_of_it() -> None:
+def test_an_observer_answers_any_number_of_trials_of_each_block() -> None:
     schedule = build_schedule(load("rek2024"), "P001", 1)
     shares: dict[str, list[float]] = {}
     for trial in schedule.trials:

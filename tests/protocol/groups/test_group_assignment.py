@@ -45,30 +45,32 @@ TREATMENTS = """
 """Names of what can be randomised."""
 
 
-def test_names_that_suggest_an_attribute_are_warned_of_and_no_others() -> None:
+def test_only_group_names_that_suggest_an_attribute_have_a_warning() -> None:
     names = [*ATTRIBUTES.split(), *TREATMENTS.split()]
     tables = "".join(f'[groups.{name}]\nsequence = ["hello", "thin", "thick"]\n' for name in names)
-    said = [one for one in warnings(grouped(groups=f"\n{tables}"), simulates=False) if one.startswith("groups.")]
-    assert [one.partition(":")[0].removeprefix("groups.") for one in said] == ATTRIBUTES.split()
+    messages = [
+        warning for warning in warnings(grouped(groups=f"\n{tables}"), simulates=False) if warning.startswith("groups.")
+    ]
+    assert [warning.partition(":")[0].removeprefix("groups.") for warning in messages] == ATTRIBUTES.split()
 
 
 def test_only_randomised_groups_are_warned_of() -> None:
-    said = [sentence for sentence in warnings(experts()) if sentence.startswith("groups.")]
-    assert [sentence.partition(":")[0] for sentence in said] == ["groups.experts", "groups.novices"]
-    assert all("groups are assigned at random" in sentence for sentence in said)
+    sentences = [sentence for sentence in warnings(experts()) if sentence.startswith("groups.")]
+    assert [sentence.partition(":")[0] for sentence in sentences] == ["groups.experts", "groups.novices"]
+    assert all("groups are assigned at random" in sentence for sentence in sentences)
     assert not [sentence for sentence in warnings(experts(PREEXISTING)) if sentence.startswith("groups.")]
     assert not [sentence for sentence in warnings(grouped()) if sentence.startswith("groups.")]
 
 
 def test_an_assignment_without_groups_is_refused() -> None:
     edit = ('format = 2\nstudy.name = "grouped"\n', f'format = 2\n{PREEXISTING}study.name = "grouped"\n')
-    with pytest.raises(ProtocolError) as refused:
+    with pytest.raises(ProtocolError) as error:
         grouped(edit, groups='sequence = ["hello", "thin", "thick"]\n')
-    assert "the study does not have groups" in str(refused.value.problems)
+    assert "the study does not have groups" in str(error.value.problems)
 
 
 def test_check_states_the_balance_of_each_group() -> None:
-    """16 participants are 8 per group, and each of the two orders comes 4 times there."""
+    """Each group has 8 of 16 participants and each of its two orders 4 times."""
     for study, assignment in ((experts(), "randomised in permuted"), (experts(PREEXISTING), "pre-existing: entered")):
         text = describe(study)
         assert text.count("with 8 participants per group, each block occurs in each position 4 times") == 2
@@ -77,12 +79,12 @@ def test_check_states_the_balance_of_each_group() -> None:
 
 @pytest.mark.parametrize("assignment", ["", PREEXISTING])
 def test_design_counts_orders_within_each_group(assignment: str) -> None:
-    judged = list(balances(experts(assignment), numbered_participants(16, "P005"), 1))
-    assert [one.participants for one in judged] == [8, 8]
-    assert [one.blocks[-1].evenness.positions for one in judged] == [((4, 4), (4, 4))] * 2
+    arrangements = list(balances(experts(assignment), numbered_participants(16, "P005"), 1))
+    assert [arrangement.participants for arrangement in arrangements] == [8, 8]
+    assert [arrangement.blocks[-1].evenness.positions for arrangement in arrangements] == [((4, 4), (4, 4))] * 2
 
 
-def test_the_preregistration_says_how_groups_are_formed() -> None:
+def test_the_preregistration_states_how_groups_are_formed() -> None:
     randomised = "randomised in permuted blocks to the groups experts and novices, with an allocation ratio of 1:1."
     assert randomised in preregistration(experts(), "0" * 64)
     text = preregistration(experts(PREEXISTING), "0" * 64)

@@ -45,12 +45,12 @@ def test_a_group_without_a_sequence_has_that_of_the_study() -> None:
 def test_a_session_beyond_the_last_is_refused() -> None:
     study = sessions()
     assert study.session_steps(None, 2) == ("thick", "thin", "end")
-    for refused in (lambda: study.session_steps(None, 3), lambda: study.check_session_number(3)):
+    for refused_call in (lambda: study.session_steps(None, 3), lambda: study.check_session_number(3)):
         with pytest.raises(
             StudyError,
             match=r"^session 3 does not exist: .* defines 2 sessions for each participant; permitted: 1 to 2$",
         ):
-            refused()
+            refused_call()
     study.check_session_number(2)
 
 
@@ -83,13 +83,13 @@ def test_a_form_follows_blocks_in_numbered_sessions(
 
 def test_a_session_has_its_own_blocks_forms_parts_and_duration() -> None:
     study = sessions()
-    first, second = (one.protocol for one in variants(study))
+    first, second = (variant.protocol for variant in variants(study))
     assert [block.id for block in first.blocks_in_order] == ["thin"]
     assert (first.parts, second.parts, study.parts) == (1, 2, 2)
     assert [(block.id, block.part) for block in second.main_blocks] == [("thick", 1), ("thin", 2)]
     assert not first.forms
     assert list(second.forms) == ["end"]
-    assert [orders_of(one).answers for one in (first, second)] == [2, 7]
+    assert [orders_of(protocol).answers for protocol in (first, second)] == [2, 7]
     assert expected_duration_s(first) < expected_duration_s(second)
 
 
@@ -105,16 +105,16 @@ def test_parts_of_a_session_count_up(group: str, session: int) -> None:
 
 def test_a_study_of_one_sequence_is_as_it_was() -> None:
     study = load("demo")
-    (one,) = variants(study)
-    assert one.protocol is study
-    assert one.name == ""
+    (variant,) = variants(study)
+    assert variant.protocol is study
+    assert variant.name == ""
     assert study.steps == study.sequence
 
 
 def test_design_judges_each_group_over_its_own_participants() -> None:
-    judged = list(balances(grouped(), numbered_participants(7), 1))
-    assert [one.session for one in judged] == ["group first_thin", "group first_thick"]
-    assert sorted(one.participants for one in judged) == [3, 4]
+    arrangements = list(balances(grouped(), numbered_participants(7), 1))
+    assert [arrangement.session for arrangement in arrangements] == ["group first_thin", "group first_thick"]
+    assert sorted(arrangement.participants for arrangement in arrangements) == [3, 4]
     (alone,) = balances(grouped(), numbered_participants(1), 1)
     assert alone.participants == 1
 
@@ -138,13 +138,13 @@ def test_shares_are_kept_exactly_in_every_permuted_block() -> None:
     assert len({tuple(allocated[first : first + 3]) for first in range(0, 300, 3)}) == 3, "blocks are shuffled"
 
 
-def test_allocation_depends_on_the_secret_alone() -> None:
-    """Whoever knows every earlier allocation still needs the secret: other secrets agree on these, not on the next."""
+def test_allocation_depends_only_on_the_secret() -> None:
+    """Earlier allocations do not reveal the next: other secrets share them but differ in the next one."""
     shares = {"a": 1, "b": 1}
     assert [group_of(shares, SECRET, n) for n in range(1, 9)] == [
         group_of({"b": 1, "a": 1}, SECRET, n) for n in range(1, 9)
     ]
     secrets = [bytes([number % 256, number // 256]) + bytes(30) for number in range(2000)]
     sequences = [[group_of(shares, secret, n) for n in (1, 2, 3)] for secret in secrets]
-    alike = [one[2] for one in sequences if one[:2] == ["a", "b"]]
+    alike = [sequence[2] for sequence in sequences if sequence[:2] == ["a", "b"]]
     assert 0.45 < alike.count("a") / len(alike) < 0.55

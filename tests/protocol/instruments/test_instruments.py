@@ -18,29 +18,29 @@ def bounds_of(item: dict[str, Any], found: dict[str, Any]) -> tuple[float, float
 
 
 @pytest.mark.parametrize("name", sorted(ITEMS))
-def test_an_instrument_has_its_items_source_and_licence_and_no_texts_that_it_may_not_have(name: str) -> None:
+def test_an_instrument_has_items_source_and_licence_and_only_licensed_texts(name: str) -> None:
     assert set(Instrument.names()) == set(ITEMS)
-    found = Instrument(name).table
-    assert len({item["id"] for item in found["items"]}) == len(found["items"]) == ITEMS[name]
-    assert min(len(found[key]) for key in ("source", "licence", "compared")) > 20
-    texts = [key for item in found["items"] for key in ("text", "low", "high", "short") if key in item]
-    labels = [scale for scale in found.get("scales", {}).values() if "labels" in scale]
-    assert bool(texts) == bool(found["languages"]) == (name in WITH_TEXTS)
+    table = Instrument(name).table
+    assert len({item["id"] for item in table["items"]}) == len(table["items"]) == ITEMS[name]
+    assert min(len(table[key]) for key in ("source", "licence", "compared")) > 20
+    texts = [key for item in table["items"] for key in ("text", "low", "high", "short") if key in item]
+    labels = [scale for scale in table.get("scales", {}).values() if "labels" in scale]
+    assert bool(texts) == bool(table["languages"]) == (name in WITH_TEXTS)
     assert bool(labels) == (name == "sus")
 
 
 @pytest.mark.parametrize("case", PUBLISHED["worked"], ids=lambda case: f"{case['instrument']} {case['answers']}"[:40])
 def test_published_and_worked_scores(case: dict[str, Any]) -> None:
-    found = Instrument(case["instrument"]).table
-    asked = [item["id"] for item in found["items"]]
-    given = case["answers"] if isinstance(case["answers"], list) else [case["answers"]] * len(asked)
-    answers = dict(zip(asked, given, strict=True))
-    bounds = {item["id"]: bounds_of(item, found) for item in found["items"] if item["kind"] != "choice"}
+    table = Instrument(case["instrument"]).table
+    item_ids = [item["id"] for item in table["items"]]
+    item_answers = case["answers"] if isinstance(case["answers"], list) else [case["answers"]] * len(item_ids)
+    answers = dict(zip(item_ids, item_answers, strict=True))
+    bounds = {item["id"]: bounds_of(item, table) for item in table["items"] if item["kind"] != "choice"}
     for which, expected in case["scores"].items():
-        counted = Score.model_validate(found["scores"][which])
-        assert counted.compute(answers, bounds) == pytest.approx(expected)
-        without = {item: answer for item, answer in answers.items() if item != counted.items[0]}
-        assert counted.compute(without, bounds) is None
+        score = Score.model_validate(table["scores"][which])
+        assert score.compute(answers, bounds) == pytest.approx(expected)
+        without = {item: answer for item, answer in answers.items() if item != score.items[0]}
+        assert score.compute(without, bounds) is None
 
 
 RANGES = {
@@ -52,9 +52,9 @@ RANGES = {
 
 @pytest.mark.parametrize(("name", "which"), RANGES)
 def test_scores_have_their_published_range(name: str, which: str) -> None:
-    found = Instrument(name).table
-    bounds = {item["id"]: bounds_of(item, found) for item in found["items"] if item["kind"] != "choice"}
-    assert Score.model_validate(found["scores"][which]).range_of(bounds) == pytest.approx(RANGES[name, which])
+    table = Instrument(name).table
+    bounds = {item["id"]: bounds_of(item, table) for item in table["items"] if item["kind"] != "choice"}
+    assert Score.model_validate(table["scores"][which]).range_of(bounds) == pytest.approx(RANGES[name, which])
 
 
 def test_the_range_of_a_score_of_reversed_and_weighted_items() -> None:
@@ -68,9 +68,9 @@ def test_the_range_of_a_score_of_reversed_and_weighted_items() -> None:
 
 @pytest.mark.parametrize("name", PUBLISHED["items"])
 def test_scores_have_their_published_items(name: str) -> None:
-    found = Instrument(name).table
-    places = {item["id"]: place for place, item in enumerate(found["items"], start=1)}
+    table = Instrument(name).table
+    places = {item["id"]: place for place, item in enumerate(table["items"], start=1)}
     for which, expected in PUBLISHED["items"][name].items():
-        assert sorted(places[item] for item in found["scores"][which]["items"]) == expected
-    turned = [places[item] for one in found["scores"].values() for item in one.get("reverse", ())]
+        assert sorted(places[item] for item in table["scores"][which]["items"]) == expected
+    turned = [places[item] for score in table["scores"].values() for item in score.get("reverse", ())]
     assert sorted(turned) == PUBLISHED["reversed"].get(name, [])

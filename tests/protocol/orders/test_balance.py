@@ -26,28 +26,28 @@ def ordered(order: str, conditions: int = 3, repetitions: int = 1) -> Protocol:
     )
 
 
-def test_positions_and_what_follows_what_are_counted():
-    counted = evenness("abc", ["abc", "bca", "abb"])
-    assert counted.positions == ((2, 1, 0), (0, 2, 1), (1, 1, 1))
-    assert counted.follows == ((0, 2, 0), (0, 1, 2), (1, 0, 0))
-    assert counted.after_another == (2, 0, 0, 2, 1, 0)
-    assert (counted.longest_run, counted.shortest_distance) == (2, 1)
-    assert counted.orders == 3
-    assert not counted.positions_even
-    assert not counted.follows_even
+def test_positions_and_successions_are_counted():
+    counts = evenness("abc", ["abc", "bca", "abb"])
+    assert counts.positions == ((2, 1, 0), (0, 2, 1), (1, 1, 1))
+    assert counts.follows == ((0, 2, 0), (0, 1, 2), (1, 0, 0))
+    assert counts.after_another == (2, 0, 0, 2, 1, 0)
+    assert (counts.longest_run, counts.shortest_distance) == (2, 1)
+    assert counts.orders == 3
+    assert not counts.positions_even
+    assert not counts.follows_even
 
 
 @pytest.mark.parametrize("conditions", range(2, 13))
-def test_a_williams_design_balances_every_full_round_and_no_other_number(conditions: int):
+def test_a_williams_design_is_balanced_only_after_full_rounds(conditions: int):
     rows = conditions * (1 + conditions % 2)
     protocol = ordered('order = "williams"', conditions)
     for participants in (1, rows - 1, rows, rows + 1, 2 * rows):
-        counted = balance(protocol, numbered_participants(participants), 1).blocks[0].evenness
+        counts = balance(protocol, numbered_participants(participants), 1).blocks[0].evenness
         full = participants % rows == 0
-        assert counted.positions_even == full
-        assert counted.follows_even == full
+        assert counts.positions_even == full
+        assert counts.follows_even == full
         if full:
-            assert set(counted.after_another) == {participants // conditions}
+            assert set(counts.after_another) == {participants // conditions}
 
 
 def test_a_range_of_ids_is_judged_from_its_first_one():
@@ -63,10 +63,10 @@ def test_a_range_of_ids_is_judged_from_its_first_one():
 
 
 def test_blocks_with_one_code_are_left_out():
-    judged = balance(REK, numbered_participants(5), 3)
-    assert [block.id for block in judged.blocks] == ["liquids", "delays"]
-    assert (judged.study, judged.participants, judged.seed) == ("rek2024", 5, 3)
-    assert sum(map(sum, judged.blocks[1].evenness.positions)) == 5 * 7
+    judgement = balance(REK, numbered_participants(5), 3)
+    assert [block.id for block in judgement.blocks] == ["liquids", "delays"]
+    assert (judgement.study, judgement.participants, judgement.seed) == ("rek2024", 5, 3)
+    assert sum(map(sum, judgement.blocks[1].evenness.positions)) == 5 * 7
 
 
 def test_a_design_needs_participants():
@@ -74,7 +74,7 @@ def test_a_design_needs_participants():
         balance(REK, (), 1)
 
 
-def test_a_design_names_no_condition():
+def test_a_design_does_not_name_conditions():
     text = describe_balance(balance(REK, numbered_participants(12), 1))
     for name in ("honey", "light_oil", "delay_125"):
         assert name not in text
@@ -105,12 +105,16 @@ DESIGNS = (  # order, conditions, repetitions, participants
 
 
 def test_designs_in_words() -> None:
-    """The second block, of two conditions in random order, is told the same in all: its text is left out."""
+    """The description of the second block, which never changes, is omitted."""
     alone = SOUND.replace('["is_thin", "is_thick"]', '["is_thin"]').replace('["on_time", "both"]', '["both"]')
-    told = [describe_balance(balance(parse(alone.encode(), "small"), ("P001",), 1))]
+    descriptions = [describe_balance(balance(parse(alone.encode(), "small"), ("P001",), 1))]
     for order, conditions, repetitions, ids in DESIGNS:
-        judged = describe_balance(balance(ordered(order, conditions, repetitions), ids, 1))
-        told.append(f"{order!r}, {conditions} conditions {repetitions} times\n{judged.split('Looking (block')[0]}")
+        description = describe_balance(balance(ordered(order, conditions, repetitions), ids, 1))
+        descriptions.append(
+            f"{order!r}, {conditions} conditions {repetitions} times\n{description.split('Looking (block')[0]}"
+        )
     physical = load("physical_liquids")
-    told += [describe_balance(balance(physical, numbered_participants(participants), 1)) for participants in (1, 6, 12)]
-    check_kept(Path(__file__).with_name("designs.txt"), "\n=====\n".join(told).split("\n"))
+    descriptions += [
+        describe_balance(balance(physical, numbered_participants(participants), 1)) for participants in (1, 6, 12)
+    ]
+    check_kept(Path(__file__).with_name("designs.txt"), "\n=====\n".join(descriptions).split("\n"))

@@ -25,8 +25,8 @@ from tests.protocol.trials.level_studies import study
 
 
 def block(name: str = "b", **fields: Any) -> BlockOrder:
-    given: dict[str, Any] = {"phase": "main", "part": 1, "codes": ("A", "B", "C"), "order": "fixed", "repetitions": 1}
-    return BlockOrder(id=name, **(given | fields))
+    keys: dict[str, Any] = {"phase": "main", "part": 1, "codes": ("A", "B", "C"), "order": "fixed", "repetitions": 1}
+    return BlockOrder(id=name, **(keys | fields))
 
 
 def orders_by_seed(of: BlockOrder, participant: str = "P001") -> list[tuple[str, ...]]:
@@ -49,7 +49,7 @@ def test_shuffled_codes_come_once_in_each_repetition() -> None:
         assert orders_by_seed(other, participant) != orders, "each block and participant draws its own"
 
 
-def test_each_round_of_interleaved_tracks_has_those_that_go_on() -> None:
+def test_each_round_of_interleaved_tracks_has_the_unfinished_ones() -> None:
     orders = orders_by_seed(block(order="interleaved", slots=(2, 4, 3)))
     for codes in orders:
         rounds = codes[:3], codes[3:6], codes[6:8], codes[8:]
@@ -69,7 +69,7 @@ def test_blocked_tracks_are_completed_one_after_another_in_a_drawn_order() -> No
 
 
 @pytest.mark.parametrize(("order", "expected"), [("latin", 3), ("williams", 6)])
-def test_places_take_all_rows_of_a_square_before_one_comes_again(order: str, expected: int) -> None:
+def test_places_use_all_rows_of_a_square_before_repeating_one(order: str, expected: int) -> None:
     """A Williams design of three codes has six rows, a Latin square three; in each column codes are even."""
     rows = [codes_of("study", block(order=order), "P001", 1, place) for place in range(1, 2 * expected + 1)]
     assert set(rows[:expected]) == set(rows[expected:]), "all rows, then all again"
@@ -91,18 +91,18 @@ def test_a_session_numbers_its_trials_and_forms_and_has_breaks_between() -> None
     assert orders.answers == 6 * 2 + 3 * 2, "of each main trial and each time of the form"
     schedule = build_schedule(orders, "P001", 5)
     assert (schedule.participant, schedule.seed) == ("P001", 5)
-    told = [
+    session_steps = [
         step.page_id if isinstance(step, PageStep)
         else (step.form, step.items, step.after, step.time) if isinstance(step, FormStep)
         else (step.number, step.block, step.phase, step.part, step.index, step.of, step.code, step.items)
         for step in schedule.steps
     ]  # fmt: skip
-    questions, asked = ("effort", "hurry"), ("warm", "cold")
+    questions, questions_of_form = ("effort", "hurry"), ("warm", "cold")
 
     def trial(number: int, code: str) -> tuple[Any, ...]:
-        return number, "b", "main", 1, number - 1, 6, code, asked
+        return number, "b", "main", 1, number - 1, 6, code, questions_of_form
 
-    assert told == [
+    assert session_steps == [
         "hello", ("load", questions, None, 1), (1, "warm_up", "practice", None, 1, 1, "practice", ("ready",)),
         ("load", questions, "warm_up", 2), trial(2, "A"), trial(3, "B"), "rest", trial(4, "C"), trial(5, "A"), "rest",
         trial(6, "B"), trial(7, "C"), ("load", questions, "b", 3), "thanks",
@@ -115,17 +115,17 @@ def test_shuffled_questions_are_drawn_for_each_trial_and_each_time_a_form_is_ask
     form = FormOrder("load", items, "shuffled")
     of_block = block(items=items, item_order="shuffled", repetitions=2)
     schedule = build_schedule(Orders("study", (form, of_block, form)), "P001", 5)
-    drawn = [step.items for step in schedule.steps if isinstance(step, FormStep | Trial)]
-    assert len(drawn) == len(set(drawn)) == 8
-    assert {tuple(sorted(order)) for order in drawn} == {items}
+    item_orders = [step.items for step in schedule.steps if isinstance(step, FormStep | Trial)]
+    assert len(item_orders) == len(set(item_orders)) == 8
+    assert {tuple(sorted(order)) for order in item_orders} == {items}
     again = build_schedule(Orders("study", (of_block,)), "P001", 5)
-    assert [step.items for step in again.trials] == drawn[1:7], "forms move no draw of a trial"
+    assert [step.items for step in again.trials] == item_orders[1:7], "forms move no draw of a trial"
 
 
 def test_main_blocks_change_places_and_parts_keep_theirs() -> None:
     main = [block(name, part=part) for part, name in enumerate("xyz", start=1)]
     steps = ("hello", main[0], block("practice", phase="practice", part=None), *main[1:])
-    seen = set()
+    orders_seen = set()
     for seed in range(60):
         orders = Orders("study", steps, "random")
         numbers = blocks_in_order(orders, "P001", seed)
@@ -135,15 +135,15 @@ def test_main_blocks_change_places_and_parts_keep_theirs() -> None:
         assert names == [expected[0], "practice", *expected[1:]]
         parts = dict.fromkeys((trial.block, trial.part) for trial in schedule.trials if trial.phase == "main")
         assert list(parts) == list(zip(expected, (1, 2, 3), strict=True))
-        seen.add(numbers)
-    assert len(seen) == 6
+        orders_seen.add(numbers)
+    assert len(orders_seen) == 6
     assert blocks_in_order(Orders("study", steps, "fixed"), "P001", 1) == (0, 1, 2)
     balanced = Orders("study", steps, "balanced")
     rows = [blocks_in_order(balanced, "P001", 1, place) for place in range(1, 13)]
     assert (len(set(rows[:6])), set(rows[:6])) == (6, set(rows[6:]))
 
 
-def test_a_track_is_named_by_its_standard_and_number_or_by_what_is_compared() -> None:
+def test_a_track_is_named_by_its_standard_and_number_or_by_its_conditions() -> None:
     two = study(('kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8',
                  'kind = "updown"\ntrials = 24\ntracks = 2'))  # fmt: skip
     block_of = two.blocks["viscosity"]
@@ -162,8 +162,8 @@ def test_a_track_is_named_by_its_standard_and_number_or_by_what_is_compared() ->
     noisy = study(('design = "2ifc"', 'design = "yesno"'), ("repetitions = 8", "repetitions = 20"))
     design = noisy.design_of(noisy.blocks["viscosity"])
     assert {track.slots for track in tracks_of(noisy, noisy.blocks["viscosity"])} == {60 + design.noise(60)}
-    caught = study(("repetitions = 8", "repetitions = 20"), ("task =", "catch = { share = 0.1 }\ntask ="))
-    for track in tracks_of(caught, caught.blocks["viscosity"]):
+    with_catch = study(("repetitions = 8", "repetitions = 20"), ("task =", "catch = { share = 0.1 }\ntask ="))
+    for track in tracks_of(with_catch, with_catch.blocks["viscosity"]):
         assert (track.slots, len(track.catch)) == (66, 6)
         assert all(first.stop <= second.start for first, second in pairwise(track.catch))
         assert (track.catch[0].start >= 0, track.catch[-1].stop <= 66) == (True, True)
@@ -174,21 +174,21 @@ def test_a_track_is_named_by_its_standard_and_number_or_by_what_is_compared() ->
     assert (track.standard, track.slots) == (None, 3 * 8 + 1), "the first trial assigns a number to a level"
 
 
-def test_what_scheduling_needs_of_a_study_is_told_block_by_block() -> None:
+def test_the_orders_of_a_study_are_described_block_by_block() -> None:
     tables = tomllib.loads(text_of("brackish"))
     tables["sequence"] = ["consent", "form", "practice", "liquids", "delays"]
     tables["study"]["block_order"] = "balanced"
     more = {"order": "constrained", "repetitions": 6, "max_repeats": 2, "break_every": 4, "break_page": "consent"}
     tables["blocks"]["liquids"] |= more
     protocol = Protocol.model_validate(tables)
-    asked = ("wet", "calm", "near")
-    questions = {"items": asked, "item_order": "shuffled"}
+    item_ids = ("wet", "calm", "near")
+    questions = {"items": item_ids, "item_order": "shuffled"}
     main: dict[str, Any] = {"phase": "main", "repetitions": 1, "order": "shuffled"} | questions
     assert orders_of(protocol) == Orders(
         "brackish",
         (
             "consent",
-            FormOrder("form", asked, "shuffled"),
+            FormOrder("form", item_ids, "shuffled"),
             block("practice", phase="practice", part=None, codes=("practice",)),
             BlockOrder(id="liquids", part=1, codes=("L1", "L2"), **(main | more)),
             BlockOrder(id="delays", part=2, codes=("D1", "D2"), **main),
@@ -196,11 +196,11 @@ def test_what_scheduling_needs_of_a_study_is_told_block_by_block() -> None:
         "balanced",
     )
     assert orders_of(protocol).answers == 12 * 3 + 2 * 3 + 3
-    assert [one.breaks for one in orders_of(protocol).blocks] == [0, 2, 0]
+    assert [block.breaks for block in orders_of(protocol).blocks] == [0, 2, 0]
     key = draw_key(protocol, lambda: 0.0)
     assert key.keys() == {"practice", "liquids", "delays"}
     assert key["practice"] == {"practice": "learn"}
-    assert {code: {drawn[code] for drawn in drawn_keys(protocol)} for code in ("D1", "D2")} == {
+    assert {code: {key_codes[code] for key_codes in drawn_keys(protocol)} for code in ("D1", "D2")} == {
         "D1": {"see_prompt", "see_tardy"}, "D2": {"see_prompt", "see_tardy"},
     }  # fmt: skip
     far = tomllib.loads(text_of("brackish"))

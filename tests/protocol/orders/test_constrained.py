@@ -47,7 +47,7 @@ class Counting:
 
 
 def every_order(codes: int, repetitions: int, constraint: Constraint) -> Iterator[Order]:
-    """List by brute force what keeps a constraint."""
+    """Return by brute force all orders that satisfy a constraint."""
 
     def longer(order: Order) -> Iterator[Order]:
         if len(order) == codes * repetitions:
@@ -99,33 +99,33 @@ def test_an_order_keeps_its_constraint_or_is_impossible(size: tuple[int, int], c
 
 @pytest.mark.parametrize("codes", range(1, 5))
 @pytest.mark.parametrize("repetitions", range(1, 4))
-def test_impossible_is_exactly_what_no_order_keeps(codes: int, repetitions: int):
+def test_a_constraint_is_impossible_exactly_if_no_order_satisfies_it(codes: int, repetitions: int):
     for runs in (None, 1, 2, 3, 4):
         for distance in (None, 1, 2, 3, 4, 5, 6):
             constraint = Constraint(runs, distance)
-            told = constraint.impossible_key(codes, repetitions)
-            assert (told is None) == any(map(bool, every_order(codes, repetitions, constraint))), constraint
+            impossible_key = constraint.impossible_key(codes, repetitions)
+            assert (impossible_key is None) == any(map(bool, every_order(codes, repetitions, constraint))), constraint
 
 
 def proposals(codes: int, repetitions: int, constraint: Constraint) -> dict[Order, Fraction]:
     """Draw proposals until every order was proposed, and return each with its chance."""
     wanted = set(every_order(codes, repetitions, constraint))
     draw = stream(1, "proposals").random
-    found: dict[Order, Fraction] = {}
+    chances: dict[Order, Fraction] = {}
     for _ in range(100 * len(wanted) + 1000):
         proposal = propose_order(codes, repetitions, constraint, draw)
         assert proposal is not None
         order, weight = proposal
-        assert found.setdefault(order, 1 / weight) == 1 / weight
-        if len(found) == len(wanted):
+        assert chances.setdefault(order, 1 / weight) == 1 / weight
+        if len(chances) == len(wanted):
             break
-    assert found.keys() == wanted
-    return found
+    assert chances.keys() == wanted
+    return chances
 
 
 @pytest.mark.parametrize(("codes", "repetitions", "constraint"), SMALL)
-def test_every_order_is_proposed_none_is_lost_in_a_dead_end(codes: int, repetitions: int, constraint: Constraint):
-    """The chances that proposals claim for themselves are those of all orders, and sum to exactly one."""
+def test_every_order_is_proposed_with_its_stated_probability(codes: int, repetitions: int, constraint: Constraint):
+    """The stated probabilities of the proposals equal those of all orders and sum to exactly one."""
     chances = proposals(codes, repetitions, constraint)
     assert sum(chances.values()) == 1
 
@@ -140,12 +140,12 @@ def test_the_chain_ends_close_to_all_orders_being_equally_likely(codes: int, rep
     for _ in range(PROPOSALS - 1):
         later = [0.0] * len(now)
         for here, chance in enumerate(now):
-            moved = 0.0
+            distance = 0.0
             for there, proposed in enumerate(chances):
                 accepted = proposed * min(1.0, chances[here] / proposed)
                 later[there] += chance * accepted
-                moved += accepted
-            later[here] += chance * (1 - moved)
+                distance += accepted
+            later[here] += chance * (1 - distance)
         now = later
     assert sum(abs(chance - 1 / len(now)) for chance in now) / 2 < 1e-4
 
@@ -180,7 +180,7 @@ def test_orders_of_many_participants_are_even(codes: int, repetitions: int, cons
         (5, 40, Constraint(min_distance=5)),
     ],
 )
-def test_large_and_tight_blocks_meet_no_dead_end(codes: int, repetitions: int, constraint: Constraint):
+def test_large_and_tight_blocks_avoid_dead_ends(codes: int, repetitions: int, constraint: Constraint):
     draw = stream(1, "large").random
     for _ in range(10):
         proposal = propose_order(codes, repetitions, constraint, draw)
@@ -189,7 +189,7 @@ def test_large_and_tight_blocks_meet_no_dead_end(codes: int, repetitions: int, c
         assert Counter(proposal[0]) == dict.fromkeys(range(codes), repetitions)
 
 
-def test_a_dead_end_is_told_and_costs_no_more_than_the_rest():
+def test_a_dead_end_is_reported_without_extra_cost():
     draw = Counting(1)
     assert propose_order(2, 2, Constraint(min_distance=3), draw) is None
     assert draw.draws <= 4

@@ -24,7 +24,7 @@ ORDERS = [
 
 
 def run(protocol: Protocol, participant: str, seed: int) -> list[RecordedTrial]:
-    """Return what a whole session records."""
+    """Return the recorded trials of a whole session."""
     names = ("number", "block", "phase", "part", "index", "of", "code", "items")
     return [
         RecordedTrial(**{name: getattr(trial, name) for name in names})
@@ -60,7 +60,9 @@ def test_an_untouched_session_is_reproduced(seed: int, participant: str, order: 
         (lambda trials: trials[1:], "trial 2 was presented first, but trial 1 was due"),
     ],
 )  # fmt: skip
-def test_whatever_was_changed_is_named(change: Callable[[list[RecordedTrial]], list[RecordedTrial]], expected: str):
+def test_each_change_of_the_recorded_trials_is_named(
+    change: Callable[[list[RecordedTrial]], list[RecordedTrial]], expected: str
+):
     recorded = change(run(SHUFFLED, "P001", 3))
     assert reproduce(SHUFFLED, 3, "P001", recorded, complete=True) == (expected,)
 
@@ -85,23 +87,23 @@ def test_a_session_that_ended_early_is_reproduced_as_far_as_it_went(trials: int)
 
 
 def test_repeated_and_unanswered_attempts_are_reproduced():
-    one, two, *rest = run(SHUFFLED, "P001", 3)
-    recorded = [one, replace(two, items=None), replace(two, items=None), two, *rest]
+    first, second, *rest = run(SHUFFLED, "P001", 3)
+    recorded = [first, replace(second, items=None), replace(second, items=None), second, *rest]
     assert reproduce(SHUFFLED, 3, "P001", recorded, complete=True) == ()
 
 
 @pytest.mark.parametrize("reached", [4, 5])
-def test_a_block_that_a_resumed_session_presents_again_is_reproduced_where_the_study_says_so(reached: int):
+def test_a_block_repeated_after_resuming_is_reproduced_if_the_study_permits_it(reached: int):
     trials = run(SHUFFLED, "P001", 3)
     by = {
         resume: SHUFFLED.model_copy(update={"study": SHUFFLED.study.model_copy(update={"resume": resume})})
         for resume in ("block", "trial")
     }
     for resume, expected in (("block", ()), ("trial", (f"trial 2 was presented after trial {reached}",))):
-        found = reproduce(by[resume], 3, "P001", [*trials[:reached], *trials[1:]], complete=True)
-        assert tuple(one.partition(",")[0] for one in found) == expected
-    (found,) = reproduce(by["block"], 3, "P001", [*trials[:reached], *trials[2:]], complete=True)
-    assert found.startswith(f"trial 3 was presented after trial {reached}, but")
+        differences = reproduce(by[resume], 3, "P001", [*trials[:reached], *trials[1:]], complete=True)
+        assert tuple(difference.partition(",")[0] for difference in differences) == expected
+    (differences,) = reproduce(by["block"], 3, "P001", [*trials[:reached], *trials[2:]], complete=True)
+    assert differences.startswith(f"trial 3 was presented after trial {reached}, but")
 
 
 def journal(trials: tuple[Trial, ...]) -> Iterator[dict[str, Any]]:
@@ -118,7 +120,7 @@ def journal(trials: tuple[Trial, ...]) -> Iterator[dict[str, Any]]:
                 yield {"event": "responses", **which, "items": rows[::-1]}
 
 
-def test_what_was_run_is_read_from_a_journal():
+def test_recorded_trials_are_read_from_a_journal():
     trials = build_schedule(SHUFFLED, "P001", 3).trials
     recorded = recorded_trials(map(event_from, journal(trials)))
     assert [(trial.number, trial.code) for trial in recorded] == [
@@ -128,6 +130,6 @@ def test_what_was_run_is_read_from_a_journal():
     assert reproduce(SHUFFLED, 3, "P001", recorded, complete=False) == ()
 
 
-def test_a_line_that_is_none_of_a_journal_is_refused():
+def test_a_line_that_does_not_belong_to_a_journal_is_refused():
     with pytest.raises(KeyError):
         recorded_trials([event_of("responses", trial=1, attempt=1)])

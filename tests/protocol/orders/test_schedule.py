@@ -46,8 +46,8 @@ def codes(schedule: Schedule, block: str) -> list[str]:
     ],
     ids=["rek2024", "demo", "small"],
 )
-def test_whole_schedules_stay_what_they_were(protocol: Protocol, digest: str):
-    """Sessions under way and receipts on disk rely on it: a change here needs another name of stream or order."""
+def test_whole_schedules_do_not_change(protocol: Protocol, digest: str):
+    """Running sessions and stored receipts depend on them: a change needs a new name of a stream or order."""
     steps = [
         repr(build_schedule(protocol, f"P{number:03d}", seed).steps)
         for number in range(1, 51)
@@ -85,7 +85,7 @@ def edited(old: str, new: str):
 
 @pytest.mark.slow
 @given(seeds)
-def test_a_draw_more_in_one_stream_moves_no_other(seed: int):
+def test_an_extra_draw_in_one_stream_does_not_change_the_others(seed: int):
     before = build_schedule(SMALL, "P1", seed)
     more_repetitions = build_schedule(edited("repetitions = 2", "repetitions = 3"), "P1", seed)
     assert codes(more_repetitions, "feel")[:4] == codes(before, "feel")
@@ -132,7 +132,7 @@ def test_labels_are_neutral_and_in_the_participants_language():
     assert trials[1].label(REK, "nl") == "Vloeistofinstelling 1"
 
 
-def test_a_schedule_names_no_condition():
+def test_a_schedule_does_not_name_conditions():
     schedule = build_schedule(REK, "P001", 1)
     blinded = [trial for trial in schedule.trials if trial.phase == "main"]
     for name in (*REK.conditions, *REK.liquids):
@@ -141,7 +141,7 @@ def test_a_schedule_names_no_condition():
 
 
 def of_six(order: str, more: str = "") -> Protocol:
-    """The small protocol with six conditions, their blocks' order, and what else the block says."""
+    """Return the small protocol with six conditions in this order and further keys of the block."""
     names = [f"c{number}" for number in range(6)]
     tables = "".join(f'[conditions.{name}]\nliquid = "thin"\ndelay_ms = {ms}\n' for ms, name in enumerate(names))
     listed = ", ".join(f'"{name}"' for name in names)
@@ -152,8 +152,8 @@ def of_six(order: str, more: str = "") -> Protocol:
 
 
 def test_dealt_orders_are_the_same_on_every_machine():
-    shown = [codes(build_schedule(of_six("williams"), f"P00{number}", 1), "feel") for number in (1, 2)]
-    assert [" ".join(order) for order in shown] == ["L4 L5 L3 L6 L2 L1", "L6 L1 L5 L2 L4 L3"]
+    orders = [codes(build_schedule(of_six("williams"), f"P00{number}", 1), "feel") for number in (1, 2)]
+    assert [" ".join(order) for order in orders] == ["L4 L5 L3 L6 L2 L1", "L6 L1 L5 L2 L4 L3"]
     assert " ".join(codes(build_schedule(of_six("latin"), "P001", 1), "feel")) == "L4 L5 L6 L1 L2 L3"
 
 
@@ -184,7 +184,7 @@ def with_breaks(every: int) -> Protocol:
 @pytest.mark.parametrize(
     ("every", "expected"), [(1, "1 pause 2 pause 3 pause 4"), (2, "1 2 pause 3 4"), (3, "1 2 3 pause 4")]
 )
-def test_breaks_come_between_trials_and_not_after_the_last(every: int, expected: str):
+def test_breaks_are_between_trials_and_not_after_the_last(every: int, expected: str):
     protocol = with_breaks(every)
     steps = build_schedule(protocol, "P001", 1).steps
     in_block = [
@@ -212,14 +212,14 @@ def rows(square: Square, codes: int, repetitions: int = 1) -> list[tuple[int, ..
 
 
 def positions(orders: list[tuple[int, ...]]) -> set[int]:
-    """Return how often codes come in positions: one number if they do so equally often."""
+    """Return the distinct counts of codes per position: a single number if they are equal."""
     counts = Counter((position, code) for order in orders for position, code in enumerate(order))
     codes, length = len(set(orders[0])), len(orders[0])
     return {counts[position, code] for position in range(length) for code in range(codes)}
 
 
 def follows(orders: list[tuple[int, ...]]) -> set[int]:
-    """Return how often codes follow others: one number if they do so equally often."""
+    """Return the distinct counts of successions of codes: a single number if they are equal."""
     counts = Counter(pair for order in orders for pair in pairwise(order))
     codes = len(set(orders[0]))
     return {counts[first, then] for first in range(codes) for then in range(codes) if first != then}
@@ -242,7 +242,7 @@ def test_williams_designs_as_they_are_printed_in_books():
 
 
 @pytest.mark.parametrize("codes", SIZES)
-def test_a_latin_square_is_even_in_position_alone(codes: int):
+def test_a_latin_square_balances_only_positions(codes: int):
     orders = rows("latin", codes)
     assert len(orders) == codes
     assert positions(orders) == {1}
@@ -251,7 +251,7 @@ def test_a_latin_square_is_even_in_position_alone(codes: int):
 
 @pytest.mark.parametrize("codes", SIZES)
 @pytest.mark.parametrize("square", ["williams", "latin"])
-def test_repetitions_are_as_even_as_the_first_and_no_code_follows_itself(square: Square, codes: int):
+def test_repetitions_are_as_balanced_as_the_first_and_codes_never_follow_themselves(square: Square, codes: int):
     for repetitions in (2, 3, codes + 1):
         orders = rows(square, codes, repetitions)
         assert len(positions(orders)) == 1
@@ -263,12 +263,12 @@ def test_repetitions_are_as_even_as_the_first_and_no_code_follows_itself(square:
 
 @pytest.mark.parametrize("codes", SIZES)
 def test_the_borders_of_repetitions_are_even_exactly_where_it_is_said(codes: int):
-    told = [repetitions for repetitions in range(1, 2 * codes) if has_even_borders(codes, repetitions)]
-    found = [
+    claimed = [repetitions for repetitions in range(1, 2 * codes) if has_even_borders(codes, repetitions)]
+    counted_out = [
         repetitions for repetitions in range(1, 2 * codes) if len(follows(rows("williams", codes, repetitions))) == 1
     ]
-    assert told == found
-    assert codes in told
+    assert claimed == counted_out
+    assert codes in claimed
 
 
 def test_a_single_code_has_a_single_row():

@@ -44,11 +44,11 @@ def test_every_kind_has_a_sample() -> None:
 def test_a_kind_takes_its_answers_and_refuses_others_in_a_sentence(
     kind: str, keys: dict[str, Any], answers: tuple[Any, ...], none: tuple[Any, ...]
 ) -> None:
-    asked = question(kind, keys)
-    assert (asked.kind_id, type(asked)) == (kind, KINDS[kind])
-    assert [asked.problem(answer, CONTEXT) for answer in answers] == [None] * len(answers)
-    assert all(asked.problem(answer, CONTEXT) for answer in none)
-    assert question_of(asked.model_dump(mode="json", by_alias=True)) == asked
+    asked_question = question(kind, keys)
+    assert (asked_question.kind_id, type(asked_question)) == (kind, KINDS[kind])
+    assert [asked_question.problem(answer, CONTEXT) for answer in answers] == [None] * len(answers)
+    assert all(asked_question.problem(answer, CONTEXT) for answer in none)
+    assert question_of(asked_question.model_dump(mode="json", by_alias=True)) == asked_question
 
 
 @pytest.mark.parametrize(("kind", "keys"), [sample[:2] for sample in SAMPLES])
@@ -57,12 +57,12 @@ def test_a_kind_takes_its_answers_and_refuses_others_in_a_sentence(
 def test_a_simulated_answer_and_one_near_it_are_answers(
     kind: str, keys: dict[str, Any], opinion: float, share: float
 ) -> None:
-    asked = question(kind, keys)
-    view = asked.view(3, CONTEXT)
+    asked_question = question(kind, keys)
+    view = asked_question.view(3, CONTEXT)
     answer = view.simulated(opinion, lambda: share)
-    assert asked.problem(answer, CONTEXT) is None
-    assert asked.problem(view.nearby(answer), CONTEXT) is None
-    levels, bounds = asked.levels(CONTEXT), asked.bounds(CONTEXT)
+    assert asked_question.problem(answer, CONTEXT) is None
+    assert asked_question.problem(view.nearby(answer), CONTEXT) is None
+    levels, bounds = asked_question.levels(CONTEXT), asked_question.bounds(CONTEXT)
     if isinstance(answer, str | tuple) and levels:
         assert {*([answer] if isinstance(answer, str) else answer)} <= set(levels)
     if bounds is not None and isinstance(answer, int | float):
@@ -71,10 +71,16 @@ def test_a_simulated_answer_and_one_near_it_are_answers(
 
 @pytest.mark.parametrize(("kind", "keys"), [sample[:2] for sample in SAMPLES])
 def test_a_page_shows_the_question_in_the_language_with_its_keys(kind: str, keys: dict[str, Any]) -> None:
-    asked = question(kind, keys)
-    view = asked.view(3, CONTEXT)
-    assert (view.id, view.number, view.text, view.required, view.widget) == ("asked", 3, "Hoe?", True, asked.widget)
+    asked_question = question(kind, keys)
+    view = asked_question.view(3, CONTEXT)
+    assert (view.id, view.number, view.text, view.required, view.widget) == (
+        "asked",
+        3,
+        "Hoe?",
+        True,
+        asked_question.widget,
+    )
     assert view.keys
-    assert asked.names_several == keys.get("several", False)
+    assert asked_question.names_several == keys.get("several", False)
     if kind == "choice":
-        assert asked.levels(CONTEXT) == {name: f"nl {name}" for name in ("left", "right", "both")}
+        assert asked_question.levels(CONTEXT) == {name: f"nl {name}" for name in ("left", "right", "both")}

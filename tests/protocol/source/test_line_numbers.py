@@ -16,7 +16,7 @@ def test_lines_of_every_kind_of_notation(pytestconfig: pytest.Config):
     compare(Path(__file__).parent / "tricky_lines.txt", lines, pytestconfig, fixed=True)
 
 
-def test_what_is_missing_is_at_the_table_around_it():
+def test_a_missing_key_has_the_line_of_its_table():
     places = Places(TRICKY)
     assert places.line(("rows", 1, "missing")) == 32
     assert places.line(("last", "end", "of", "all")) == 40
@@ -51,6 +51,6 @@ def keys_of(node: Any, path: tuple[str | int, ...] = ()):
 
 
 @pytest.mark.parametrize("header", ["[", "[]", "[[", "[[]]", "[ = "])
-def test_a_header_that_is_being_typed_hides_no_lines_before_it(header: str) -> None:
+def test_an_incomplete_header_does_not_hide_earlier_lines(header: str) -> None:
     places = Places(f"[a]\nb = 1\n{header}")
     assert places.line(("a", "b")) == 2

@@ -78,7 +78,7 @@ def key_of(protocol: Protocol, secret: bytes = SECRET) -> Key:
 
 
 def run(protocol: Protocol, key: Key, answer: str = "", participant: str = "P001", seed: int = 1) -> list[Presentation]:
-    """Return what the trials of a session present; each is answered alike, or correctly where ``answer`` is empty."""
+    """Return the presented levels of a session; each answer is ``answer``, or correct if that is empty."""
     schedule = build_schedule(protocol, participant, seed)
     return [due for due, _ in answered(protocol, key, schedule, answer)]
 
@@ -86,16 +86,18 @@ def run(protocol: Protocol, key: Key, answer: str = "", participant: str = "P001
 def answered(
     protocol: Protocol, key: Key, schedule: Schedule, answer: str = ""
 ) -> list[tuple[Presentation, TrialResult]]:
-    """Return what each trial presents, with the answer to it; trials that are passed over are left out."""
-    heard: list[TrialResult] = []
-    found = []
+    """Return the presentation and the answer of each trial that is not passed over."""
+    heard_results: list[TrialResult] = []
+    results = []
     for trial in schedule.trials:
-        due = next_level(protocol, key, schedule, trial, heard)
+        due = next_level(protocol, key, schedule, trial, heard_results)
         if due is None:
             continue
         design = protocol.design_of(protocol.blocks[trial.block])
-        given = answer or design.correct(due.arrangement) or ""
+        answer_given = answer or design.correct(due.arrangement) or ""
         block, level = protocol.blocks[trial.block], due.level
-        heard.append(trial_result(protocol, block, trial.number, trial.code, level, due.arrangement, given))
-        found.append((due, heard[-1]))
-    return found
+        heard_results.append(
+            trial_result(protocol, block, trial.number, trial.code, level, due.arrangement, answer_given)
+        )
+        results.append((due, heard_results[-1]))
+    return results

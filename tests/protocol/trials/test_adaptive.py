@@ -18,41 +18,44 @@ def adaptive(method: str, *edits: tuple[str, str]) -> Protocol:
 
 
 def answers_of(protocol: Protocol, threshold: float, seed: int = 1) -> list[TrialResult]:
-    """Return the answers of one session of an observer who is right above the threshold, and half of the time below."""
+    """Return one session's answers of an observer who is correct above the threshold and guesses below."""
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", seed)
     design = protocol.design_of(protocol.blocks["viscosity"])
-    draw, heard = np.random.default_rng(seed), []
+    draw, results = np.random.default_rng(seed), []
     for trial in schedule.trials:
-        due = next_level(protocol, key, schedule, trial, heard)
+        due = next_level(protocol, key, schedule, trial, results)
         if due is not None:
             assert due.level is not None
             right = draw.random() < (0.98 if due.level > threshold else 0.5)
             noise = not any(design.arrangements[due.arrangement])
-            heard.append(
+            results.append(
                 TrialResult(
                     trial=trial.number, code=trial.code, level=due.level, success=right, correct=right, noise=noise
                 )
             )
-    return heard
+    return results
 
 
 @pytest.mark.parametrize("kind", ["questplus", "updown"])
 def test_the_next_level_depends_on_the_levels_presented_and_not_on_how_answers_are_listed(kind: str) -> None:
     protocol = adaptive(f'kind = "{kind}"\ntrials = 20', ONE_STANDARD)
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
-    heard = answers_of(protocol, 0.4)
+    results = answers_of(protocol, 0.4)
     for number in (5, 12, 19):
-        earlier = heard[:number]
-        due = next_level(protocol, key, schedule, schedule.trials[number], heard[::-1])
+        earlier = results[:number]
+        due = next_level(protocol, key, schedule, schedule.trials[number], results[::-1])
         again = next_level(protocol, key, schedule, schedule.trials[number], earlier)
         assert due is not None
         assert due == again
-        assert due.level == heard[number].level
+        assert due.level == results[number].level
     # Answers at another level than would be chosen count at that level.
-    other = [TrialResult(trial=one.trial, code=one.code, level=0.8, success=True, correct=True) for one in heard[:10]]
-    moved = next_level(protocol, key, schedule, schedule.trials[10], other)
-    assert moved is not None
-    assert moved.level != heard[10].level
+    other = [
+        TrialResult(trial=result.trial, code=result.code, level=0.8, success=True, correct=True)
+        for result in results[:10]
+    ]
+    next_levels = next_level(protocol, key, schedule, schedule.trials[10], other)
+    assert next_levels is not None
+    assert next_levels.level != results[10].level
 
 
 @pytest.mark.slow

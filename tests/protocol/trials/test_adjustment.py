@@ -20,13 +20,13 @@ def test_steps_lead_to_more_of_the_number_and_stop_at_the_ends(level: str, direc
         {"vary": "b", "level": level, "levels": (1.0, 5.0), "spacing": "linear", "direction": direction}
     )
     setting = Adjustment.model_validate({"step_size": 0.3}).adjusting(stimulus, None if level == "value" else 9.0, 2.0)
-    one, other = setting.comparison(setting.moved(0, 1)), setting.comparison(0)
-    assert one == pytest.approx(other + 0.3)
+    after_step, before_step = setting.comparison(setting.moved(0, 1)), setting.comparison(0)
+    assert after_step == pytest.approx(before_step + 0.3)
     ends = sorted(setting.comparison(setting.moved(0, way * 1000)) for way in (-1, 1))
     assert ends == pytest.approx(sorted(stimulus.comparison(setting.standard, end) for end in (1.0, 5.0)))
 
 
-def test_steps_beyond_an_end_are_none_and_those_back_are_counted_from_it() -> None:
+def test_steps_beyond_an_end_are_ignored_and_steps_back_count_from_the_end() -> None:
     stimulus = Stimulus.model_validate({"vary": "b", "level": "value", "levels": (2.0, 18.0)})
     setting = Adjustment().adjusting(stimulus, 6.0, 2.1)
     assert setting.level(setting.place_after([-1000])) == 2.0
@@ -44,7 +44,7 @@ def test_a_step_is_a_fortieth_of_the_span_or_a_factor_on_log_spacing() -> None:
     assert Adjustment(step_size=1.1).step(stimulus) == pytest.approx(math.log10(1.1))
 
 
-def test_a_task_goes_on_for_as_long_as_a_setting_may_take() -> None:
+def test_a_setting_task_lasts_for_the_longest_setting() -> None:
     protocol = matching()
     method = protocol.method_of(protocol.blocks["matching"])
     assert isinstance(method, Adjustment)
@@ -54,6 +54,6 @@ def test_a_task_goes_on_for_as_long_as_a_setting_may_take() -> None:
 
 
 @pytest.mark.parametrize("name", ["explore", "reach"])
-def test_time_alone_ends_a_task_of_a_setting(name: str) -> None:
+def test_a_setting_task_ends_only_by_time(name: str) -> None:
     task = parse(text_of("sound").encode(), "file.toml").tasks[name].lasting(47.5)
     assert (task.limit_s, task.expected_s, task.shortest_s, task.wanted) == (47.5, 47.5, 47.5, None)

@@ -16,11 +16,11 @@ LONG = ("repetitions = 8", "repetitions = 20")
 
 def of_tracks(protocol: Protocol, participant: str = "P001") -> dict[str, list[tuple[bool, float, int]]]:
     """Return of each track whether its slots are catch trials, with level and arrangement."""
-    found: dict[str, list[tuple[bool, float, int]]] = {}
+    trials_of_track: dict[str, list[tuple[bool, float, int]]] = {}
     for due, trial in answered(protocol, key_of(protocol), build_schedule(protocol, participant, 1)):
         assert due.level is not None
-        found.setdefault(trial.code, []).append((due.catch, due.level, due.arrangement))
-    return found
+        trials_of_track.setdefault(trial.code, []).append((due.catch, due.level, due.arrangement))
+    return trials_of_track
 
 
 def test_levels_and_arrangements_of_the_other_trials_are_those_without_catch_trials() -> None:
@@ -43,19 +43,19 @@ def test_stretches_cover_the_track_in_order(share: float, trials: int) -> None:
 
 
 @pytest.mark.parametrize("method", ['kind = "updown"', 'kind = "questplus"'])
-def test_answers_to_catch_trials_move_no_level(method: str) -> None:
+def test_answers_to_catch_trials_do_not_change_the_level(method: str) -> None:
     constant = 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8'
     protocol = study((constant, f"{method}\ntrials = 20"), CATCH)
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
     levels: dict[bool, list[float | None]] = {}
     for attentive in (True, False):
-        heard: list[TrialResult] = []
+        results: list[TrialResult] = []
         for trial in schedule.trials:
-            due = next_level(protocol, key, schedule, trial, heard)
+            due = next_level(protocol, key, schedule, trial, results)
             assert due is not None
             assert due.level is not None
             right = attentive if due.catch else trial.number % 3 > 0
-            heard.append(
+            results.append(
                 TrialResult(
                     trial=trial.number, code=trial.code, level=due.level, success=right, correct=right, catch=due.catch
                 )

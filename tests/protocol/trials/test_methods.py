@@ -14,8 +14,8 @@ def setting(stimulus: Stimulus = LOG, number: int = 1) -> TrackSetting:
     return TrackSetting(stimulus=stimulus, number=number, design=default_design("2ifc"))
 
 
-def heard(*answers: tuple[float, bool], noise: tuple[int, ...] = ()) -> list[TrialResult]:
-    """Return answers with their levels; those whose number is in ``noise`` presented the standard alone."""
+def heard_answers(*answers: tuple[float, bool], noise: tuple[int, ...] = ()) -> list[TrialResult]:
+    """Return answers with their levels; trials in ``noise`` presented only the standard."""
     return [
         TrialResult(trial=number, code="A1", level=level, success=success, correct=success, noise=number in noise)
         for number, (level, success) in enumerate(answers, start=1)
@@ -44,15 +44,15 @@ def test_a_staircase_goes_down_after_successes_and_up_after_a_failure(
 ) -> None:
     """A step up is a fifth of a decade, a step down half of that; neither leaves the range."""
     method = UpDown.model_validate({"rule": rule, "step_up": 10**0.2, "ratio": 0.5})
-    assert method.after(setting(), heard(*answers)) == pytest.approx(10**exponent)
-    assert method.level(setting(), 7, heard(*answers), ()) == method.after(setting(), heard(*answers))
+    assert method.after(setting(), heard_answers(*answers)) == pytest.approx(10**exponent)
+    assert method.level(setting(), 7, heard_answers(*answers), ()) == method.after(setting(), heard_answers(*answers))
 
 
-def test_a_staircase_steps_a_tenth_of_the_range_and_begins_where_it_is_told() -> None:
+def test_a_staircase_steps_a_tenth_of_the_range_from_its_stated_start() -> None:
     method = UpDown.model_validate({"rule": "1down1up", "tracks": 2, "begin": (20.0, 30.0), "trials": 60})
     assert [method.after(setting(LINEAR, number), []) for number in (1, 2)] == pytest.approx([20.0, 30.0])
-    assert method.after(setting(LINEAR), heard((20.0, False))) == pytest.approx(24.0)
-    assert method.after(setting(LINEAR), heard((20.0, False), (24.0, True), noise=(2,))) == pytest.approx(24.0)
+    assert method.after(setting(LINEAR), heard_answers((20.0, False))) == pytest.approx(24.0)
+    assert method.after(setting(LINEAR), heard_answers((20.0, False), (24.0, True), noise=(2,))) == pytest.approx(24.0)
     assert (method.presentations(LINEAR), UpDown().presentations(LINEAR)) == (30, 60)
     assert UpDown(begin=25.0).after(setting(LINEAR, 2), []) == pytest.approx(25.0)
     assert UpDown().after(setting(LINEAR), []) == 50.0
@@ -68,8 +68,8 @@ def test_a_staircase_ends_after_its_reversals_and_answers_and_averages_the_last_
     for reversals, after, ended in ((3, 1, True), (4, 1, False), (3, 4, True), (3, 5, False)):
         stop = {"reversals": reversals, "after": after}
         stops = UpDown.model_validate({"rule": "1down1up", "stop": stop})
-        assert stops.ended(setting(LINEAR), heard(*answers)) == ended
-    assert not method.ended(setting(LINEAR), heard(*answers * 9))
+        assert stops.ended(setting(LINEAR), heard_answers(*answers)) == ended
+    assert not method.ended(setting(LINEAR), heard_answers(*answers * 9))
 
 
 @pytest.mark.parametrize(
@@ -95,10 +95,10 @@ def test_a_staircase_converges_as_published(rule: str, percent: str, ratio: floa
 
 def test_settings_begin_alternately_near_both_ends_of_the_range() -> None:
     """At most an eighth of the range from an end; the first draw decides which end is the first."""
-    for drawn, first in ((0.49, 0), (0.5, 1)):
-        draws = [lambda drawn=drawn: drawn, lambda: 0.25, lambda: 1.0]
+    for draw, first in ((0.49, 0), (0.5, 1)):
+        draws = [lambda drawn=draw: drawn, lambda: 0.25, lambda: 1.0]
         starts = [Adjustment().level(setting(LINEAR), number, (), draws) for number in (0, 1, 2)]
-        near = 10.0 + 40.0 / 8 * drawn, 50.0 - 40.0 / 8 * drawn
+        near = 10.0 + 40.0 / 8 * draw, 50.0 - 40.0 / 8 * draw
         assert starts[0] == pytest.approx(near[first])
         assert starts[1] == pytest.approx(50.0 - 40.0 / 32 if first == 0 else 10.0 + 40.0 / 32)
         assert starts[2] == pytest.approx(15.0 if first == 0 else 45.0)

@@ -29,26 +29,26 @@ LONG = ("repetitions = 8", "repetitions = 20")
 
 def presentations(protocol: Protocol) -> list[tuple[Any, Presentation]]:
     """Return trial and presentation of a whole session, every answer of which is correct."""
-    key, schedule, heard = key_of(protocol), build_schedule(protocol, "P001", 1), list[TrialResult]()
-    shown = []
+    key, schedule, results = key_of(protocol), build_schedule(protocol, "P001", 1), list[TrialResult]()
+    presented_trials = []
     for trial in schedule.trials:
-        due = next_level(protocol, key, schedule, trial, heard)
+        due = next_level(protocol, key, schedule, trial, results)
         if due is not None:
             block = protocol.blocks[trial.block]
             answer = str(protocol.design_of(block).correct(due.arrangement))
             which = trial.number, trial.code, due.level, due.arrangement
-            heard.append(trial_result(protocol, block, *which, answer, catch=due.catch))
-            shown.append((trial, due))
-    return shown
+            results.append(trial_result(protocol, block, *which, answer, catch=due.catch))
+            presented_trials.append((trial, due))
+    return presented_trials
 
 
-def test_a_comparison_is_the_standard_changed_by_its_level_and_stands_where_the_arrangement_says() -> None:
+def test_a_comparison_is_the_standard_changed_by_its_level_in_the_arranged_interval() -> None:
     """Weber fractions: 0.2 of a standard of 2 Pa s is 2.4 Pa s."""
     protocol = study()
     design = protocol.design_of(protocol.blocks["viscosity"])
-    shown = presentations(protocol)
-    assert len(shown) == 2 * 3 * 8
-    for trial, due in shown:
+    presented_trials = presentations(protocol)
+    assert len(presented_trials) == 2 * 3 * 8
+    for trial, due in presented_trials:
         assert due.level is not None
         assert due.standard is not None
         text = design.arrangement_text(due.arrangement)
@@ -56,43 +56,43 @@ def test_a_comparison_is_the_standard_changed_by_its_level_and_stands_where_the_
         assert [interval.value for interval in due.intervals] == pytest.approx(values)
         assert {interval.condition for interval in due.intervals} == {"oil"}
         assert {interval.vary for interval in due.intervals} == {"viscosity_pa_s"}
-        started = {"block": "viscosity", "code": trial.code, "arrangement": text, "level": due.level}
-        assert recorded_presentation(protocol, key_of(protocol).codes, started) == due
-        caught = recorded_presentation(protocol, key_of(protocol).codes, started | {"catch": True})
-        assert (caught.catch, caught.intervals) == (True, due.intervals)
+        fields = {"block": "viscosity", "code": trial.code, "arrangement": text, "level": due.level}
+        assert recorded_presentation(protocol, key_of(protocol).codes, fields) == due
+        catch_trial = recorded_presentation(protocol, key_of(protocol).codes, fields | {"catch": True})
+        assert (catch_trial.catch, catch_trial.intervals) == (True, due.intervals)
     for code in ("V1", "V2"):
-        track = [due for trial, due in shown if trial.code == code]
+        track = [due for trial, due in presented_trials if trial.code == code]
         assert len({due.standard for due in track}) == 1
         for first in range(0, 24, 3):
             assert sorted(due.level or 0.0 for due in track[first : first + 3]) == [0.2, 0.4, 0.8], "each round"
         for first in range(0, 24, 4):
             assert Counter(due.arrangement for due in track[first : first + 4]) == {0: 2, 1: 2}, "each four trials"
-    assert {due.standard for _, due in shown} == {1.0, 2.0}
+    assert {due.standard for _, due in presented_trials} == {1.0, 2.0}
 
 
 def test_catch_trials_present_the_largest_level_and_leave_the_other_levels_as_they_are() -> None:
     with_catch = [due for _, due in presentations(study(LONG, CATCH, TWO))]
     without = [due for _, due in presentations(study(LONG, TWO))]
-    caught = [number for number, due in enumerate(with_catch) if due.catch]
+    catch_numbers = [number for number, due in enumerate(with_catch) if due.catch]
     assert len(without) == 60
-    assert len(with_catch) == 60 + len(caught)
-    assert len(caught) == 6, "a tenth of 60"
-    assert {with_catch[number].level for number in caught} == {0.8}
+    assert len(with_catch) == 60 + len(catch_numbers)
+    assert len(catch_numbers) == 6, "a tenth of 60"
+    assert {with_catch[number].level for number in catch_numbers} == {0.8}
     assert [due for due in with_catch if not due.catch] == without
-    tenths = [10 * number // len(with_catch) for number in caught]
-    assert len(set(tenths)) >= len(caught) - 1, "spread over the session"
+    tenths = [10 * number // len(with_catch) for number in catch_numbers]
+    assert len(set(tenths)) >= len(catch_numbers) - 1, "spread over the session"
 
 
-def test_noise_trials_present_the_standard_alone() -> None:
+def test_noise_trials_present_only_the_standard() -> None:
     protocol = study(YES_NO, LONG, TWO)
-    shown = [due for _, due in presentations(protocol)]
-    noise = [due for due in shown if due.level == 0.0]
+    presented_trials = [due for _, due in presentations(protocol)]
+    noise = [due for due in presented_trials if due.level == 0.0]
     design = protocol.design_of(protocol.blocks["viscosity"])
-    assert len(shown) - len(noise) == 60
+    assert len(presented_trials) - len(noise) == 60
     assert len(noise) == design.noise(60)
     for due in noise:
         assert (due.arrangement, [interval.value for interval in due.intervals]) == (1, [2.0])
-    for due in shown:
+    for due in presented_trials:
         if due.level:
             assert [interval.value for interval in due.intervals] == pytest.approx([2.0 * (1 + due.level)])
 
@@ -115,18 +115,18 @@ def test_a_criterion_counts_the_last_answers_of_its_block(
     """Answers of another block, and in which order they are listed, do not matter."""
     trials = [SimpleNamespace(number=number, block="b" if number < 50 else "c") for number in range(1, 100)]
     block: Any = SimpleNamespace(id="b", until=SimpleNamespace(right=right, of=of))
-    heard = [
+    results = [
         TrialResult(trial=number, code="A1", level=1.0, success=value, correct=value)
         for number, value in enumerate(correct, start=1)
     ]
     others = [TrialResult(trial=60, code="A1", level=1.0, success=True, correct=True)]
     schedule: Any = SimpleNamespace(trials=trials)
-    assert is_criterion_met(block, schedule, [*others, *reversed(heard)]) == is_met
+    assert is_criterion_met(block, schedule, [*others, *reversed(results)]) == is_met
     block.until = None
-    assert not is_criterion_met(block, schedule, heard)
+    assert not is_criterion_met(block, schedule, results)
 
 
-def test_a_result_says_whether_the_answer_was_right_and_whether_there_was_anything_to_notice() -> None:
+def test_a_result_states_whether_the_answer_was_correct_and_a_difference_existed() -> None:
     protocol = study(TWO)
     block = protocol.blocks["viscosity"]
     for arrangement in (0, 1):
@@ -143,7 +143,7 @@ def test_a_result_says_whether_the_answer_was_right_and_whether_there_was_anythi
         assert (result.level, result.catch) == (0.0, False)
 
 
-def test_a_force_link_is_described_without_what_it_lacks() -> None:
+def test_a_force_link_description_omits_absent_effects() -> None:
     assert list(link_descriptions()) == []
     assert list(link_descriptions(50.0, 7.5, 0.125)) == [
         "force delayed by 50 ms", "force jitter of 7.5 ms", "12.5 % of force updates lost",

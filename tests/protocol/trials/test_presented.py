@@ -107,29 +107,32 @@ STUDIES: dict[str, Protocol] = {
 
 def presented(protocol: Protocol) -> list[str]:
     """Return a line for each trial that is not passed over, and one for each track."""
-    key, schedule, heard = key_of(protocol), build_schedule(protocol, "P001", 1), list[TrialResult]()
+    key, schedule, results = key_of(protocol), build_schedule(protocol, "P001", 1), list[TrialResult]()
     lines = [
         f"{name} {track.name}: {track.slots} slots, catch {list(track.catch)}"
         for name, block in protocol.blocks.items()
         for track in tracks_of(protocol, block)
     ]
     for trial in schedule.trials:
-        due = next_level(protocol, key, schedule, trial, heard)
+        due = next_level(protocol, key, schedule, trial, results)
         if due is None:
             continue
         block = protocol.blocks[trial.block]
-        asked = protocol.design_of(block)
+        design = protocol.design_of(block)
         right = due.level is None or due.level > 0.4 or trial.number % 2 == 0
-        answers = sorted(asked.answers, key=lambda one: (one != asked.correct(due.arrangement)) == right)
-        heard.append(
+        answers = sorted(design.answers, key=lambda answer: (answer != design.correct(due.arrangement)) == right)
+        results.append(
             trial_result(protocol, block, trial.number, trial.code, due.level, due.arrangement, (answers or ["0"])[0])
         )
-        shown = [f"{one.condition} {one.vary or ''} {one.value if one.vary else ''}".strip() for one in due.intervals]
-        letters = asked.arrangement_text(due.arrangement) if asked.arrangements else ""
-        answered = heard[-1]
+        intervals = [
+            f"{interval.condition} {interval.vary or ''} {interval.value if interval.vary else ''}".strip()
+            for interval in due.intervals
+        ]
+        letters = design.arrangement_text(due.arrangement) if design.arrangements else ""
+        answered = results[-1]
         lines.append(
             f"{trial.number} {trial.code} {key.codes[trial.block][trial.code]} {due.level} of {due.standard} {letters}"
-            f"{' catch' if due.catch else ''}: {', '.join(shown)} | {answered.correct} {answered.success}"
+            f"{' catch' if due.catch else ''}: {', '.join(intervals)} | {answered.correct} {answered.success}"
         )
         if (setting := protocol.adjusting(block, due.standard, due.level)) is not None:
             lines.append(f"    {one_line(setting)}")
@@ -137,6 +140,6 @@ def presented(protocol: Protocol) -> list[str]:
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_what_the_trials_of_a_session_present(name: str, pytestconfig: pytest.Config) -> None:
+def test_the_presented_levels_of_a_session_are_as_recorded(name: str, pytestconfig: pytest.Config) -> None:
     file = Path(__file__).parents[1] / "presented" / f"{name.replace(', ', '_').replace(' ', '_')}.txt"
     compare(file, presented(STUDIES[name]), pytestconfig, fixed=True)

@@ -101,7 +101,7 @@ def test_the_correct_answer(kind: str, arrangement: tuple[bool, ...], correct: s
 
 
 class Sharp:
-    """Notices every difference; the strongest is asked for."""
+    """An observer who notices every difference and chooses the strongest."""
 
     smallest = False
 
@@ -113,8 +113,8 @@ class Sharp:
 def test_simulated_observer_without_noise_answers_correctly(kind: str):
     built = design(kind)
     for number, arrangement in enumerate(built.arrangements):
-        taken = [2.0 if comparison else 1.0 for comparison in arrangement]
-        assert built.simulated(taken, 1.5, Sharp()) == built.correct(number)
+        levels = [2.0 if comparison else 1.0 for comparison in arrangement]
+        assert built.simulated(levels, 1.5, Sharp()) == built.correct(number)
 
 
 @pytest.mark.parametrize(
@@ -125,6 +125,6 @@ def test_feedback_is_shown_when_the_study_says(when: str, practice: bool, main: 
     assert (built.shows_feedback(True), built.shows_feedback(False)) == (practice, main)
 
 
-def test_feedback_defaults_to_practice_and_to_never_where_no_answer_is_correct():
+def test_feedback_defaults_to_practice_or_never_if_no_answer_is_correct():
     assert (design("2ifc").shows_feedback(True), design("2ifc").shows_feedback(False)) == (True, False)
     assert not design("estimation").shows_feedback(True)

@@ -18,7 +18,7 @@ from study_app.protocol.trials.designs import default_design
         ("yesno", "yes", "yes"),
     ],
 )
-def test_a_level_above_or_below_the_standard_makes_no_forced_choice_correct(
+def test_forced_choices_have_no_correct_answer_if_levels_lie_on_both_sides(
     design: str, of_ratios: str, of_values: str
 ) -> None:
     weber: Any = SimpleNamespace(level_kind="weber")

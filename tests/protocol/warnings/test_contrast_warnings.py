@@ -95,3 +95,12 @@ def test_values_at_different_standards_are_not_compared_silently(change: tuple[s
         "standard; use the same standards"
     )
     assert warnings_of(text, "analysis.contrasts.1: ") == ([sentence] if standards else [])
+
+
+def test_a_trend_with_the_delay_is_not_tested_where_liquids_are_compared() -> None:
+    (sentence,) = warnings_of(f'{STATEMENTS}analysis = {{ rising = ["thick"] }}', "analysis.rising")
+    assert "the trend in thick is not tested" in sentence
+    late = STATEMENTS.replace(
+        'conditions.water.liquid = "water"', 'conditions.water = { liquid = "honey", delay_ms = 90 }'
+    )
+    assert not warnings_of(f'{late}analysis = {{ rising = ["thick"] }}', "analysis.rising")

@@ -47,7 +47,7 @@ stimuli.damping = { vary = "damping_nspm", STIMULUS }
 """
 
 
-def compared(design: str = "2ifc", repetitions: int = 40, more: str = "") -> Protocol:
+def study_of_comparisons(design: str = "2ifc", repetitions: int = 40, more: str = "") -> Protocol:
     return parse((COMPARED.replace("DESIGN", design).replace("REPEATED", str(repetitions)) + more).encode(), "x.toml")
 
 
@@ -65,17 +65,17 @@ def test_the_spread_of_d_prime_is_that_of_the_binomial_counts() -> None:
     n, right = 20, NORMAL.cdf(1 / math.sqrt(2))  # an unbiased observer of two intervals, d′ = 1
     chances = [math.comb(n, k) * right**k * (1 - right) ** (n - k) for k in range(n + 1)]
     pairs = [
-        (chances[hits] * chances[right_of_second], found.d_prime)
+        (chances[hits] * chances[right_of_second], expectation.d_prime)
         for hits in range(n + 1)
         for right_of_second in range(n + 1)
-        if (found := two_intervals(hits, n, n - right_of_second, n)) is not None
+        if (expectation := two_intervals(hits, n, n - right_of_second, n)) is not None
     ]
     mean = sum(chance * value for chance, value in pairs)
     exact = math.sqrt(sum(chance * (value - mean) ** 2 for chance, value in pairs))
-    found = expected_mean(plan_of(compared()))
-    assert (found.trials, found.threshold) == (40, 1.0)
-    assert found.spread == pytest.approx(exact, rel=0.08)
-    assert found.median == pytest.approx(1.96 * found.spread, rel=1e-4)
+    expectation = expected_mean(plan_of(study_of_comparisons()))
+    assert (expectation.trials, expectation.threshold) == (40, 1.0)
+    assert expectation.spread == pytest.approx(exact, rel=0.08)
+    assert expectation.median == pytest.approx(1.96 * expectation.spread, rel=1e-4)
 
 
 @pytest.mark.parametrize("roving", [False, True])
@@ -104,7 +104,7 @@ def exact_spread(value: float, ratings: int) -> float:
     """
     area, draw = NORMAL.cdf(value / math.sqrt(2)), np.random.default_rng(4)
     signal, noise = draw.normal(value, 1, 10**6), draw.normal(0, 1, 10**6)
-    both = [float(np.mean(_cdf(one) ** 2)) - area**2 for one in (signal, value - noise)]
+    both = [float(np.mean(_cdf(sample) ** 2)) - area**2 for sample in (signal, value - noise)]
     variance = (area * (1 - area) + (ratings - 1) * sum(both)) / ratings**2
     return math.sqrt(2 * variance) / NORMAL.pdf(NORMAL.inv_cdf(area))
 
@@ -115,10 +115,10 @@ def _cdf(x: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("ratings", [40, 160])
 def test_the_spread_of_d_a_is_that_of_the_area_under_the_roc_curve(ratings: int) -> None:
-    found = expected_mean(RatingPlan(11, ratings))
-    assert (found.trials, found.threshold) == (ratings, 1.0)
-    assert found.spread == pytest.approx(exact_spread(1.0, ratings), rel=0.08)
-    assert found.median == pytest.approx(1.96 * found.spread, rel=1e-4)
+    expectation = expected_mean(RatingPlan(11, ratings))
+    assert (expectation.trials, expectation.threshold) == (ratings, 1.0)
+    assert expectation.spread == pytest.approx(exact_spread(1.0, ratings), rel=0.08)
+    assert expectation.median == pytest.approx(1.96 * expectation.spread, rel=1e-4)
 
 
 @pytest.mark.slow
@@ -132,20 +132,24 @@ def test_the_spread_of_d_a_is_that_of_ratings_that_the_report_analyses() -> None
     ).assign(block="b", response="rated", analysed=True)
     stimulus = Stimulus(vary="damping_nspm", level="value", levels=(1, 2))
     block = LevelBlock("b", "Block", "main", Rated(scale="seven"), stimulus, (), Constant())
-    found = [one.d_prime for one in sensitivities(block, rows) if one.participant is not None]
-    assert len(found) == people
+    estimates = [
+        sensitivity.d_prime for sensitivity in sensitivities(block, rows) if sensitivity.participant is not None
+    ]
+    assert len(estimates) == people
     expected = expected_mean(RatingPlan(7, ratings))
-    assert np.std([one for one in found if one is not None]) == pytest.approx(expected.spread, rel=0.12)
+    assert np.std([estimate for estimate in estimates if estimate is not None]) == pytest.approx(
+        expected.spread, rel=0.12
+    )
 
 
-def test_one_level_or_standards_that_levels_are_added_to_have_no_expected_d_a() -> None:
-    one, weber = rated().model_copy(), rated(stimulus="levels = [0.1, 0.6], standards = [4, 8]")
+def test_d_a_is_not_expected_for_one_level_or_for_added_levels() -> None:
+    single_level, weber = rated().model_copy(), rated(stimulus="levels = [0.1, 0.6], standards = [4, 8]")
     alone = {"few": Constant(levels=(2.0,), repetitions=12)}
-    assert mean_plan(one.model_copy(update={"methods": alone}), one.blocks["rate"]) is None
+    assert mean_plan(single_level.model_copy(update={"methods": alone}), single_level.blocks["rate"]) is None
     assert mean_plan(weber, weber.blocks["rate"]) is None
 
 
-def test_an_exponent_that_was_not_published_is_one_half_and_a_modulus_is_no_trial() -> None:
+def test_an_unpublished_exponent_is_one_half_and_a_modulus_does_not_count_as_a_trial() -> None:
     thickness = load("thickness")
     number = thickness.designs["number"].model_copy(update={"modulus": {"level": 2, "number": 10}})
     changed = thickness.model_copy(update={"analysis": None, "designs": {"number": number}})

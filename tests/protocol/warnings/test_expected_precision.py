@@ -41,13 +41,13 @@ def plan_of(protocol) -> ThresholdPlan:
 
 
 @pytest.mark.parametrize(("level", "unit"), [("weber", ""), ("difference", " N·s/m"), ("value", " N·s/m")])
-def test_only_a_weber_fraction_has_no_unit(level, unit):
+def test_only_weber_fractions_lack_a_unit(level, unit):
     plan = plan_of(study())
     stimulus = plan.stimulus.model_copy(update={"level": level})
     assert replace(plan, stimulus=stimulus).unit == unit
 
 
-def test_catch_and_noise_trials_have_no_place_among_the_trials_and_no_interval():
+def test_catch_and_noise_trials_have_neither_a_place_nor_an_interval():
     """Levels are 0.02 to 0.6; two of the observers nearly always notice 0.6, the last one only by chance or a lapse."""
     plan = plan_of(study('kind = "constant", repetitions = 9', design="yesno", block=", catch = { share = 0.1 }"))
     answered = plan.answers(np.log10([0.03, 0.05, 40.0]), np.random.default_rng(4))
@@ -66,11 +66,11 @@ def test_catch_and_noise_trials_have_no_place_among_the_trials_and_no_interval()
 def test_estimates_are_unbiased_and_as_precise_as_measured():
     plan = plan_of(study())  # 60 trials, a Weber fraction of 0.2: standard deviation 26 ± 3 %, coverage 98 ± 3 %
     truth = np.full(400, math.log10(0.2))
-    found = plan.simulate(truth, np.random.default_rng(1))
-    errors = (found.medians - truth) * math.log(10)
+    estimates = plan.simulate(truth, np.random.default_rng(1))
+    errors = (estimates.medians - truth) * math.log(10)
     assert abs(errors.mean()) < 0.05
     assert errors.std() == pytest.approx(0.27, abs=0.03)
-    assert 0.93 <= ((found.lows < truth) & (truth < found.highs)).mean() <= 0.99
+    assert 0.93 <= ((estimates.lows < truth) & (truth < estimates.highs)).mean() <= 0.99
 
 
 @pytest.mark.nightly
@@ -80,9 +80,9 @@ def test_intervals_of_1000_observers_cover_their_thresholds(trials):
     plan, rng = plan_of(study(f'kind = "questplus", trials = {trials}')), np.random.default_rng(trials)
     truth = math.log10(0.2) + math.log10(1.2) * rng.standard_normal(1000)
     in_the_session = truth + SESSION_SD * rng.standard_normal(1000)
-    found = plan.simulate(in_the_session, rng)
-    assert 0.93 <= ((found.lows < truth) & (truth < found.highs)).mean() <= 0.99
-    assert abs((found.medians - truth).mean() * math.log(10)) <= 0.05
+    estimates = plan.simulate(in_the_session, rng)
+    assert 0.93 <= ((estimates.lows < truth) & (truth < estimates.highs)).mean() <= 0.99
+    assert abs((estimates.medians - truth).mean() * math.log(10)) <= 0.05
 
 
 @pytest.mark.variants(3)
@@ -109,7 +109,7 @@ def test_long_tracks_are_scaled_from_shorter_ones():
 
 
 @pytest.mark.slow
-def test_where_limits_clip_the_levels_no_precision_is_expected():
+def test_no_precision_is_expected_if_limits_clip_the_levels():
     for damping, what in (
         ("60", "the standard is"),
         ("52", "levels above 0.0192 are"),
@@ -135,12 +135,12 @@ def test_the_planned_participants_are_said_before_those_a_precision_requires(dec
     keys = {"participants": decided[0], "precision": decided[1]}
     table = ", ".join(f"{key} = {value}" for key, value in keys.items() if value is not None)
     protocol = study(more=f"analysis = {{ {table} }}\n")
-    found = expected_of(plan_of(protocol))
-    said = dict(precision_rows(protocol, protocol.blocks["thicker"]))["Expected precision"]
-    planned = f"; ±{100 * found.group_half_width(31):.0f} % for 31 participants"
-    required = f"; ±20 % requires {found.participants_for(0.2)} participants"
-    assert [text for text in (planned, required) if text in said] == (
+    expectation = expected_of(plan_of(protocol))
+    statement = dict(precision_rows(protocol, protocol.blocks["thicker"]))["Expected precision"]
+    planned = f"; ±{100 * expectation.group_half_width(31):.0f} % for 31 participants"
+    required = f"; ±20 % requires {expectation.participants_for(0.2)} participants"
+    assert [text for text in (planned, required) if text in statement] == (
         [planned] if decided[0] else [required] if decided[1] else []
     )
     warned = list(imprecise(protocol, protocol.blocks["thicker"]))
-    assert bool(warned) == (None not in decided and found.group_half_width(31) > 0.15)
+    assert bool(warned) == (None not in decided and expectation.group_half_width(31) > 0.15)

@@ -35,19 +35,19 @@ def test_the_returned_energy_is_that_of_a_late_damper() -> None:
 
 
 def test_an_interval_presents_its_link() -> None:
-    one = study()
-    assert one.has_imperfect_link
+    protocol = study()
+    assert protocol.has_imperfect_link
     assert not load("rek2024").has_imperfect_link
-    assert one.presented_scene(Stimulated("water"), 7).link == ForceLink(delay_s=0.01, seed=7)
-    assert one.presented_scene(Stimulated("damper"), 7).link == PROMPT_LINK
-    varied = one.presented_scene(Stimulated("damper", "force_delay_ms", 80.0), 7)
+    assert protocol.presented_scene(Stimulated("water"), 7).link == ForceLink(delay_s=0.01, seed=7)
+    assert protocol.presented_scene(Stimulated("damper"), 7).link == PROMPT_LINK
+    varied = protocol.presented_scene(Stimulated("damper", "force_delay_ms", 80.0), 7)
     assert varied.link == ForceLink(delay_s=0.08, seed=7)
-    assert varied.liquids == one.scene_for("damper").liquids
+    assert varied.liquids == protocol.scene_for("damper").liquids
     jittered = study(("force_delay_ms = 10", "force_delay_ms = 12\nforce_jitter_ms = 3\nforce_loss = 0.1"))
     assert jittered.presented_scene(Stimulated("water"), 7).link == ForceLink(
         delay_s=0.012, jitter_s=0.003, loss=0.1, seed=7
     )
-    damping = one.presented_scene(Stimulated("water", "wake.scaling", 2000.0), 7)
+    damping = protocol.presented_scene(Stimulated("water", "wake.scaling", 2000.0), 7)
     assert damping.link.delay_s == 0.01
     assert damping.liquids[0].wake is not None
     assert damping.liquids[0].wake.scaling == 2000
@@ -63,20 +63,20 @@ def test_each_attempt_and_interval_has_jitter_of_its_own() -> None:
         for interval in (1, 2)
     }
     assert len(seeds) == 32
-    assert all(0 <= one < 2**32 for one in seeds)
+    assert all(0 <= seed < 2**32 for seed in seeds)
     assert link_seed(1, "P001", 3, 1, None) == link_seed(1, "P001", 3, 1, 1)
 
 
 def test_the_numbers_of_a_link_are_searched_for_as_leaks() -> None:
-    one = study(("force_delay_ms = 10", "force_delay_ms = 12.345\nforce_jitter_ms = 3.217\nforce_loss = 0.12345"))
-    words = telltales(one)
+    protocol = study(("force_delay_ms = 10", "force_delay_ms = 12.345\nforce_jitter_ms = 3.217\nforce_loss = 0.12345"))
+    words = telltales(protocol)
     for text in ("12.345", "0.012345", "3.217", "0.12345"):
         assert words.in_text(f"a {text} b"), text
 
 
 @pytest.mark.slow
 def test_forcedelay_is_permitted_whole() -> None:
-    one = load("forcedelay")
-    assert one.format == 2
-    assert not [*delay_warnings(one)]
-    assert "2IFC of force_delay_ms, standard 0" in describe(one)
+    protocol = load("forcedelay")
+    assert protocol.format == 2
+    assert not [*delay_warnings(protocol)]
+    assert "2IFC of force_delay_ms, standard 0" in describe(protocol)

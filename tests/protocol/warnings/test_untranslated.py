@@ -52,11 +52,11 @@ def study(*languages: str, **pages: Any) -> dict[str, Any]:
         ("Danke", [("en", "de", True, True)]),
     ],
 )
-def test_a_text_is_in_another_language_if_it_is_known_there_alone_or_equals_the_first(
+def test_a_text_is_untranslated_if_it_equals_the_first_or_is_known_only_there(
     texts: Any, expected: list[tuple[Any, ...]]
 ) -> None:
-    found = untranslated_texts(study("en", "de", only={"title": texts}))
-    flagged = [text for text in found if isinstance(texts, dict) or text.language == "en"]
+    untranslated = untranslated_texts(study("en", "de", only={"title": texts}))
+    flagged = [text for text in untranslated if isinstance(texts, dict) or text.language == "en"]
     assert flagged == [UntranslatedText(("pages", "only", "title"), *fields) for fields in expected]
 
 
@@ -95,9 +95,9 @@ def test_places_are_counted_from_1_and_at_most_five_are_listed() -> None:
 
 def test_a_session_does_not_begin_with_shipped_sentences_of_another_language() -> None:
     """A single word may be the same in both; a text that no participant reads does not matter."""
-    with pytest.raises(SessionError) as refused:
+    with pytest.raises(SessionError) as error:
         check_translated(MIXED)
-    assert str(refused.value) == (
+    assert str(error.value) == (
         "2 texts on German pages are still in English: pages.first.title, pages.first.body; translate the texts that "
         "the designer lists under Languages, or run a pilot session"
     )

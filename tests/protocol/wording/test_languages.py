@@ -87,28 +87,30 @@ SHIPPED = ("rek2024", "demo", "physical_liquids", "slime")
 
 
 def texts(protocol: Protocol) -> list[str]:
-    """Return what pages, introductions and instructions say, in every language."""
+    """Return the texts of pages, introductions and instructions in every language."""
     localised = [page.body for page in protocol.pages.values()]
-    localised += [one.intro for one in protocol.questionnaires.values()]
+    localised += [form.intro for form in protocol.questionnaires.values()]
     localised += [task.instruction for task in protocol.tasks.values() if task.instruction is not None]
-    return [protocol.text(one, language) for one in localised for language in protocol.study.languages]
+    return [protocol.text(text, language) for text in localised for language in protocol.study.languages]
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_no_page_speaks_of_feeling_and_the_statements_stay(name: str) -> None:
+def test_pages_without_force_do_not_mention_feeling_except_in_statements(name: str) -> None:
     study = load(name)
-    seen = without_force(study)
+    forceless = without_force(study)
     assert [text for text in texts(study) if FEELING.search(text)]
-    assert [text for text in texts(seen) if FEELING.search(text)] == []
+    assert [text for text in texts(forceless) if FEELING.search(text)] == []
     for key, questionnaire in study.questionnaires.items():
-        assert seen.questionnaires[key].items == questionnaire.items
-    assert seen.conditions == study.conditions
-    assert seen.model_copy(update={key: getattr(study, key) for key in ("pages", "questionnaires", "tasks")}) == study
+        assert forceless.questionnaires[key].items == questionnaire.items
+    assert forceless.conditions == study.conditions
+    assert (
+        forceless.model_copy(update={key: getattr(study, key) for key in ("pages", "questionnaires", "tasks")}) == study
+    )
 
 
 def test_every_sentence_is_one_of_a_shipped_study() -> None:
-    said = " ".join(" ".join(text.split()) for name in SHIPPED for text in texts(load(name)))
-    assert [sentence for sentence in SENTENCES if sentence not in said] == []
+    message = " ".join(" ".join(text.split()) for name in SHIPPED for text in texts(load(name)))
+    assert [sentence for sentence in SENTENCES if sentence not in message] == []
 
 
 @pytest.mark.parametrize(("table", "key"), [("pages", "body"), ("questionnaires", "intro"), ("tasks", "instruction")])
@@ -117,23 +119,23 @@ def test_sentences_about_force_are_replaced_in_each_table_and_language(table: st
     written = {"en": "Stir.\n\nPress the space bar when\nit feels familiar. It feels new.", "nl": "U voelt iets."}
     entries = {name: entry.model_copy(update={key: written}) for name, entry in getattr(study, table).items()}
     displayed = getattr(without_force(study.model_copy(update={table: entries})), table)
-    replaced = {"en": "Stir.\n\nPress the space bar when it is familiar. It feels new.", "nl": "U voelt iets."}
+    replaced = {"en": "Stir.\n\nPress the space bar when you are used to it. It feels new.", "nl": "U voelt iets."}
     assert displayed == {name: entry.model_copy(update={key: replaced}) for name, entry in entries.items()}
     assert displayed
 
 
 def test_a_study_of_ones_own_is_shown_as_it_is_written() -> None:
     study = load("demo")
-    asked = {"intro": "What did you feel?"}
-    questionnaires = {name: one.model_copy(update=asked) for name, one in study.questionnaires.items()}
+    changes = {"intro": "What did you feel?"}
+    questionnaires = {name: form.model_copy(update=changes) for name, form in study.questionnaires.items()}
     own = study.model_copy(update={"questionnaires": questionnaires})
     assert without_force(own).questionnaires == own.questionnaires
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_the_programs_own_questions_speak_of_no_feeling(language: str) -> None:
-    said = words(language)
-    assert [one for one in said.design_questions.values() if FEELING.search(one)] == []
+def test_the_programs_own_questions_do_not_mention_feeling(language: str) -> None:
+    texts_of_program = words(language)
+    assert [question for question in texts_of_program.design_questions.values() if FEELING.search(question)] == []
 
 
 def spanish(folder: Path, **changed: str) -> Path:
@@ -147,11 +149,11 @@ def spanish(folder: Path, **changed: str) -> Path:
 
 
 def test_a_labs_own_language_is_one_like_the_others(tmp_path: Path) -> None:
-    own, refused = languages.own_languages(spanish(tmp_path).parent)
-    assert refused == {}
+    own, refusals = languages.own_languages(spanish(tmp_path).parent)
+    assert refusals == {}
     assert own["es"].continue_ == "¡Continue"
-    said = own["es"].missing([5, 8])
-    assert said != said.replace("¡", "") == words("en").missing([5, 8])
+    missing_text = own["es"].missing([5, 8])
+    assert missing_text != missing_text.replace("¡", "") == words("en").missing([5, 8])
     assert vars(own["es"]).keys() == vars(words("en")).keys()
 
 
@@ -172,20 +174,20 @@ def test_a_labs_own_language_is_one_like_the_others(tmp_path: Path) -> None:
         ("done", "done = ", "cannot be read as TOML"),
     ],
 )
-def test_an_incomplete_language_is_refused_with_what_is_wrong(tmp_path: Path, key: str, line: str, said: str) -> None:
-    own, refused = languages.own_languages(spanish(tmp_path, **{key: line}).parent)
+def test_an_incomplete_language_is_refused_with_its_errors(tmp_path: Path, key: str, line: str, said: str) -> None:
+    own, refusals = languages.own_languages(spanish(tmp_path, **{key: line}).parent)
     assert own == {}
-    assert said in refused["es"]
-    assert "\n" not in refused["es"]
+    assert said in refusals["es"]
+    assert "\n" not in refusals["es"]
 
 
-def test_a_file_of_a_shipped_language_or_a_folder_that_cannot_be_read_changes_nothing(
+def test_language_files_of_shipped_languages_and_unreadable_folders_are_ignored(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "de.toml").write_bytes((Path(languages.__file__).parent / "de.toml").read_bytes())
-    own, refused = languages.own_languages(tmp_path)
-    assert (own, list(refused)) == ({}, ["de"])
-    assert "remove the file" in refused["de"]
+    own, refusals = languages.own_languages(tmp_path)
+    assert (own, list(refusals)) == ({}, ["de"])
+    assert "remove the file" in refusals["de"]
 
     def fail(_folder: Path, _pattern: str) -> NoReturn:
         raise OSError(errno.EIO, "Input/output error")
@@ -213,21 +215,21 @@ def test_a_study_in_the_labs_language_is_checked_and_described(tmp_path: Path) -
     study.write_text(STUDY, encoding="utf-8", newline="\n")
     command = [sys.executable, "-m", "study_app", "check", str(study)]
     environment = {**os.environ, "LIQUID_STUDY_WORKSPACE": str(folder)}
-    done = subprocess.run(command, check=False, capture_output=True, text=True, env=environment)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert re.search(r"Languages +es\n", done.stdout)
+    process = subprocess.run(command, check=False, capture_output=True, text=True, env=environment)
+    assert (process.returncode, process.stderr) == (0, "")
+    assert re.search(r"Languages +es\n", process.stdout)
     spanish(folder / "languages", done="")
-    done = subprocess.run(command, check=False, capture_output=True, text=True, env=environment)
-    assert done.returncode == 2
-    assert "es.toml: done is missing" in done.stderr
-    assert "1 problem\n" in done.stderr, "texts that the study leaves out are not missing in this language"
+    process = subprocess.run(command, check=False, capture_output=True, text=True, env=environment)
+    assert process.returncode == 2
+    assert "es.toml: done is missing" in process.stderr
+    assert "1 problem\n" in process.stderr, "texts that the study leaves out are not missing in this language"
 
 
 @pytest.mark.parametrize("content", ['name = "Espa\u00f1ol"'.encode("latin-1"), 'name = "x"'.encode("utf-16")])
-def test_a_language_file_in_another_encoding_is_named_with_what_to_do(tmp_path: Path, content: bytes) -> None:
+def test_a_language_file_in_another_encoding_is_named_with_a_remedy(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "es.toml").write_bytes(content)
-    _, refused = languages.own_languages(tmp_path)
-    assert refused["es"] == f"{tmp_path / 'es.toml'} is not UTF-8 text: save it as UTF-8"
+    _, refusals = languages.own_languages(tmp_path)
+    assert refusals["es"] == f"{tmp_path / 'es.toml'} is not UTF-8 text: save it as UTF-8"
 
 
 @pytest.mark.slow
@@ -246,8 +248,8 @@ def test_results_in_the_labs_language_are_read_where_its_file_is_missing(
     assert verify_study(results).errors == (), "with another file"
     monkeypatch.undo()
     (content,) = recorded_contents(results)
-    (asked,) = content.protocol["questionnaires"]["pair/answer"]["items"]
-    assert asked["text"] == {"es": own["es"].design_questions["abx"]}
+    (item,) = content.protocol["questionnaires"]["pair/answer"]["items"]
+    assert item["text"] == {"es": own["es"].design_questions["abx"]}
     with pytest.raises(ProtocolError, match="1 problem"):
         load(study)
 

@@ -40,7 +40,7 @@ STARTS: dict[str, Callable[[Path], object]] = {
 
 
 class Recorded(Files):
-    """A copy of a session, and a command for whatever may happen to it."""
+    """A copy of a session with a command for each possible damage."""
 
     def __init__(self, study: Path) -> None:
         self.study = study
@@ -48,15 +48,15 @@ class Recorded(Files):
         super().__init__(session.path)
 
     def replay(self) -> Iterator[str]:
-        found = replay(self.root)
-        yield f"{found.recordings} recordings, {'proved' if found.proved else 'not proved'}"
+        replay_result = replay(self.root)
+        yield f"{replay_result.recordings} recordings, {'proved' if replay_result.proved else 'not proved'}"
         for kind in ("differences", "missing", "uncompared"):
-            yield from (f"{kind}: {one}" for one in getattr(found, kind))
+            yield from (f"{kind}: {message}" for message in getattr(replay_result, kind))
 
     def reproduce(self) -> Iterator[str]:
-        found = reproduce_session(self.root)
-        yield from (f"differs: {one}" for one in found.differences)
-        yield from (f"followed: {one}" for one in found.followed)
+        reproduction = reproduce_session(self.root)
+        yield from (f"differs: {difference}" for difference in reproduction.differences)
+        yield from (f"followed: {line}" for line in reproduction.followed)
 
     def nudge(self, recording: str, column: str, amount: float, first: int, last: int | None = None) -> None:
         """Add an amount to rows of a column of a recording."""
@@ -67,31 +67,31 @@ class Recorded(Files):
 
     def receipt(self, *gone: str, **changes: Any) -> None:
         """Change fields of the receipt, or take some away."""
-        held = json.loads((self.root / "receipt.json").read_text("utf-8")) | changes
-        told = {name: value for name, value in held.items() if name not in gone}
-        self.write("receipt.json", json.dumps(told).encode())
+        content = json.loads((self.root / "receipt.json").read_text("utf-8")) | changes
+        receipt_fields = {name: value for name, value in content.items() if name not in gone}
+        self.write("receipt.json", json.dumps(receipt_fields).encode())
 
     def velocity(self, **estimator: Any) -> None:
         """Let the receipt name another estimator of the velocity."""
-        held = json.loads((self.root / "receipt.json").read_text("utf-8"))
-        held["protocol"]["scene"]["velocity"] = estimator
-        self.write("receipt.json", json.dumps(held).encode())
+        content = json.loads((self.root / "receipt.json").read_text("utf-8"))
+        content["protocol"]["scene"]["velocity"] = estimator
+        self.write("receipt.json", json.dumps(content).encode())
 
     def no_recording(self, trial: int, reason: str = "") -> None:
-        """Let the journal say that a recording was lost, or nothing."""
-        told = (
+        """Replace the journal line of a recording by a lost recording, or by an unrelated note."""
+        line_fields = (
             {"event": "recording_lost", "reason": reason} if reason else {"event": "note", "kind": "mark", "text": ""}
         )
 
         def lose(lines: Lines) -> None:
             for number, line in enumerate(lines):
                 if line["event"] == "recorded" and line["trial"] == trial:
-                    lines[number] = {name: line[name] for name in ("n", "t_s", "at", "trial", "attempt")} | told
+                    lines[number] = {name: line[name] for name in ("n", "t_s", "at", "trial", "attempt")} | line_fields
 
         forge(self.root / "journal.jsonl", lose)
 
     def known(self, event: str, trial: int, at: int = 0, /, **fields: Any) -> None:
-        """Change a line as one who has the key; ``"*2"`` and ``"+1"`` are of the number that is there."""
+        """Change a line with the key; ``"*2"`` and ``"+1"`` change its present number."""
 
         def edit(lines: Lines) -> None:
             line = [line for line in lines if line["event"] == event and line["trial"] == trial][at]
@@ -107,7 +107,7 @@ class Recorded(Files):
         change(self.root, edit)
 
     def answer(self, trial: int, value: Any, *, chosen: bool = True) -> None:
-        """Change an answer as one who has the key, and the choice before it."""
+        """Change an answer and its choice with the key."""
 
         def edit(lines: Lines) -> None:
             for line in (line for line in lines if line.get("trial") == trial):
@@ -119,12 +119,12 @@ class Recorded(Files):
         change(self.root, edit)
 
     def pass_over(self, trial: int) -> None:
-        """Put a line that says that a trial was passed over in the place of its lines."""
+        """Replace the lines of a trial by one that records it as passed over."""
 
         def edit(lines: Lines) -> None:
             first, *rest = [line for line in lines if line.get("trial") == trial]
-            told = {"event": "passed_over", "trial": trial, "reason": "track_ended"}
-            lines[lines.index(first)] = {name: first[name] for name in ("n", "t_s", "at")} | told
+            line_fields = {"event": "passed_over", "trial": trial, "reason": "track_ended"}
+            lines[lines.index(first)] = {name: first[name] for name in ("n", "t_s", "at")} | line_fields
             for line in rest:
                 lines.remove(line)
 
@@ -144,7 +144,7 @@ class Recorded(Files):
 
 
 def player(made: Callable[[str], Path], folder: Path) -> Play:
-    """Return what plays transcripts of copies of sessions in a folder."""
+    """Return a function that plays transcripts on copies of sessions in a folder."""
 
     def begun(start: str) -> Recorded:
         shutil.rmtree(folder / "study", ignore_errors=True)

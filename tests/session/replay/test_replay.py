@@ -69,7 +69,7 @@ class TachometerDevice(ScriptedDevice):
 
 
 def resumed_on_another_device(folder: Path) -> Path:
-    """Hold a session that goes on with another device after its first trial; return its folder."""
+    """Run a session that continues with another device after its first trial; return its folder."""
     with ScriptedDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
         with begun(folder, device, servo) as store:
             runner, wait = held(store, device, servo)
@@ -79,9 +79,9 @@ def resumed_on_another_device(folder: Path) -> Path:
             runner.post(PauseRequested(store.clock.seconds(), "operator"))
         place: Path = store.folder.path
     with LightDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
-        described = Rig(device, servo).described
+        description = Rig(device, servo).described
         with reopen_store(
-            place, small.protocol(), b"small", operator="", device=described, screens={}, now_ns=servo.now_ns
+            place, small.protocol(), b"small", operator="", device=description, screens={}, now_ns=servo.now_ns
         ) as store:
             runner, wait = held(store, device, servo)
             servo.advance(900)  # its recording begins at a tick that the one before holds too
@@ -100,23 +100,27 @@ def test_the_task_of_an_interval_begins_with_its_first_sample_that_was_not_rejec
 
 
 def test_at_most_eight_seconds_that_differ_are_listed() -> None:
-    listed = [replay_module._list_seconds([*range(count)]) for count in (1, 8, 9)]
-    assert listed == ["second 0", "second 0, 1, 2, 3, 4, 5, 6, 7", "second 0, 1, 2, 3, 4, 5, 6, 7 … (9 in all)"]
+    lists_of_seconds = [replay_module._list_seconds([*range(count)]) for count in (1, 8, 9)]
+    assert lists_of_seconds == [
+        "second 0",
+        "second 0, 1, 2, 3, 4, 5, 6, 7",
+        "second 0, 1, 2, 3, 4, 5, 6, 7 … (9 in all)",
+    ]
 
 
 def comes_out(place: Path, count: int) -> Replayed:
-    """Replay a session, whose recordings come out to the last bit."""
-    found = replay(place)
-    assert (found.differences, found.missing, found.uncompared) == ((), (), ())
-    assert (found.recordings, found.proved) == (count, True)
+    """Replay a session; check that its recordings agree bit by bit."""
+    replay_result = replay(place)
+    assert (replay_result.differences, replay_result.missing, replay_result.uncompared) == ((), (), ())
+    assert (replay_result.recordings, replay_result.proved) == (count, True)
     paths = [path for path in place.glob("recordings/*.parquet") if "frames" not in path.name]
     times_ns = [recordings.read_samples(path, secret_of(path)).time_ns for path in paths]
-    assert found.lasted_s == pytest.approx(sum(float(each[-1] - each[0]) for each in times_ns) / 1e9)
-    return found
+    assert replay_result.lasted_s == pytest.approx(sum(float(times[-1] - times[0]) for times in times_ns) / 1e9)
+    return replay_result
 
 
 def stirred(folder: Path, device: ScriptedDevice, *, before: int, until: int) -> Path:
-    """Hold a session whose servo runs some ticks before it begins, and until its first trial; return its folder."""
+    """Run a session up to its first trial, with a servo that started some ticks earlier; return its folder."""
     with device, Servo(device, clock=VirtualClock(), elements=100) as servo:
         servo.advance(before)
         with begun(folder, device, servo) as store:
@@ -130,46 +134,46 @@ def stirred(folder: Path, device: ScriptedDevice, *, before: int, until: int) ->
     return place
 
 
-def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
-    found = comes_out(session(rehearsed), 4)
-    assert found.lasted_s > 3
-    assert found.seconds == sum(
+def test_a_rehearsed_session_is_replayed_bit_by_bit(rehearsed: Path) -> None:
+    replay_result = comes_out(session(rehearsed), 4)
+    assert replay_result.lasted_s > 3
+    assert replay_result.seconds == sum(
         len(recordings.read_checks(path, secret_of(path)).device_force)
         for path in session(rehearsed).glob("recordings/trial-00?.parquet")
     )
-    assert 0 < found.computed_s < found.took_s
+    assert 0 < replay_result.computed_s < replay_result.took_s
 
 
-def test_the_error_of_the_force_sent_comes_out_again_and_another_is_named(
+def test_the_replayed_force_error_is_equal_and_a_different_one_is_named(
     rehearsed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = StudyFolder(rehearsed)
     lines = raw(open_events(journal.read(session(rehearsed) / "journal.jsonl"), read_key(study.path)))
     errors = [line["delivered_error"] for line in lines if line["event"] == "trial_ended"]
-    felt = [error for error in errors if error is not None]  # some of its trials are shorter than the fade-in
-    assert len(felt) > 0
-    assert all(0.005 < error < 1.0 for error in felt)
+    known_errors = [error for error in errors if error is not None]  # some of its trials are shorter than the fade-in
+    assert len(known_errors) > 0
+    assert all(0.005 < error < 1.0 for error in known_errors)
     right = replay_module.recompute_force_error
     monkeypatch.setattr(replay_module, "recompute_force_error", lambda *which: right(*which) + 2e-6)
-    found = replay(session(rehearsed)).differences
-    assert len(found) == len(felt)
-    assert all(it.endswith("the column delivered_error differs") for it in found)
+    differences = replay(session(rehearsed)).differences
+    assert len(differences) == len(known_errors)
+    assert all(difference.endswith("the column delivered_error differs") for difference in differences)
 
 
 def test_each_computed_column_of_a_recording_is_compared(rehearsed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    read = recordings.read_samples
+    read_samples = recordings.read_samples
     columns = (*recordings.ROUNDED_TO, "limiters", "status")
 
     def changed_samples(path: Path, secret: bytes) -> Any:
-        samples = read(path, secret)
+        samples = read_samples(path, secret)
         for row, name in enumerate(columns, start=1):
             samples[name][-row] += 1
         return samples
 
     monkeypatch.setattr(recordings, "read_samples", changed_samples)
-    found = replay(session(rehearsed)).differences
+    differences = replay(session(rehearsed)).differences
     names = ["force on the hand" if name == "device_force_n" else f"column {name}" for name in columns]
-    counts = {name: sum(f"the {name} differs in second" in it for it in found) for name in names}
+    counts = {name: sum(f"the {name} differs in second" in difference for difference in differences) for name in names}
     assert counts == dict.fromkeys(names, 4)
 
 
@@ -194,19 +198,19 @@ def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
     assert replay(place).differences
 
 
-def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path) -> None:
+def test_repeats_pauses_stops_and_fades_are_replayed_bit_by_bit(tmp_path: Path) -> None:
     place = troubled(tmp_path / "results")
     comes_out(place, 5)
     (place / "recordings" / "trial-001.parquet").unlink()
-    found = replay(place)
+    replay_result = replay(place)
     unknown = ("trial 1, attempt 2", "trial 1, attempt 3", "trial 1, attempt 4")
     why = "the recording continues an earlier one, which is missing or has a gap"
-    assert (found.recordings, found.differences) == (1, ())
-    assert found.uncompared == tuple(f"{name}: {why}" for name in unknown)
+    assert (replay_result.recordings, replay_result.differences) == (1, ())
+    assert replay_result.uncompared == tuple(f"{name}: {why}" for name in unknown)
 
 
 @pytest.mark.parametrize("liquid", STRESSED)
-def test_forces_that_limits_change_come_out_to_the_last_bit(tmp_path: Path, liquid: str) -> None:
+def test_limited_forces_are_replayed_bit_by_bit(tmp_path: Path, liquid: str) -> None:
     place = stressed(tmp_path / "results", liquid)
     recording = place / "recordings" / "trial-001.parquet"
     limiters = recordings.read_samples(recording, secret_of(recording)).limiters
@@ -214,7 +218,7 @@ def test_forces_that_limits_change_come_out_to_the_last_bit(tmp_path: Path, liqu
     comes_out(place, 1)
 
 
-def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tmp_path: Path) -> None:
+def test_a_session_continued_with_another_device_is_replayed_bit_by_bit(tmp_path: Path) -> None:
     place = resumed_on_another_device(tmp_path / "results")
     comes_out(place, 2)
     receipt = json.loads((place / "receipt.json").read_text("utf-8"))
@@ -248,7 +252,7 @@ def test_each_part_of_a_session_is_replayed_by_the_force_rules_that_its_receipt_
         replay(place)
 
 
-def test_a_session_on_a_device_that_measures_velocity_comes_out_to_the_last_bit(tmp_path: Path) -> None:
+def test_a_session_with_measured_velocity_is_replayed_bit_by_bit(tmp_path: Path) -> None:
     place = stirred(tmp_path / "results", TachometerDevice(), before=0, until=500)
     comes_out(place, 1)
 
@@ -260,6 +264,6 @@ def test_a_session_on_a_device_that_measures_velocity_comes_out_to_the_last_bit(
 
 
 @pytest.mark.parametrize("ticks", [200, 450, 550, 650])
-def test_a_trial_soon_after_a_short_preflight_comes_out_to_the_last_bit(tmp_path: Path, ticks: int) -> None:
+def test_a_trial_soon_after_a_short_preflight_is_replayed_bit_by_bit(tmp_path: Path, ticks: int) -> None:
     """The recording begins while the servo's start fade is under way, of which 0.1 s are over by then."""
     comes_out(stirred(tmp_path / "results", ScriptedDevice(), before=100, until=ticks), 1)

@@ -37,28 +37,30 @@ def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_force_of_a_link_is_computed_again_to_its_checksum(rehearsed: Path) -> None:
     (session,) = StudyFolder(rehearsed).sessions()
-    found = replay(session.path)
-    assert found.differences == found.missing == found.uncompared == ()
-    assert found.recordings == 6
-    assert found.proved
+    replay_result = replay(session.path)
+    assert replay_result.differences == replay_result.missing == replay_result.uncompared == ()
+    assert replay_result.recordings == 6
+    assert replay_result.proved
 
 
 def test_another_seed_of_the_link_is_found(rehearsed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(replay_module, "link_seed", lambda *_: 1)
     (session,) = StudyFolder(rehearsed).sessions()
-    assert any("the force on the hand differs" in one for one in replay(session.path).differences)
+    assert any("the force on the hand differs" in difference for difference in replay(session.path).differences)
 
 
 def test_the_session_measures_the_delays_that_were_requested(rehearsed: Path) -> None:
     (session,) = StudyFolder(rehearsed).sessions()
     key, protocol = read_key(rehearsed), parse(STUDY.encode(), "late.toml")
     lines = raw(open_events(journal.read(session.journal), key))
-    started = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
+    start_lines = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
     ended = [line for line in lines if line["event"] == "interval_ended"]
     assert len(ended) == 6
     errors_ms = []
     for line in ended:
-        interval = recorded_presentation(protocol, key.codes, started[line["trial"]]).intervals[line["interval"] - 1]
+        interval = recorded_presentation(protocol, key.codes, start_lines[line["trial"]]).intervals[
+            line["interval"] - 1
+        ]
         assert "invalid" not in line
         if interval.vary == "force_delay_ms":
             errors_ms.append(line["value_delivered"] - interval.value)
@@ -67,7 +69,7 @@ def test_the_session_measures_the_delays_that_were_requested(rehearsed: Path) ->
     assert sum(errors_ms) / 4 == pytest.approx(2.5, abs=1)
 
 
-def test_the_analysis_finds_delivered_delays_and_what_safety_withheld(rehearsed: Path, tmp_path: Path) -> None:
+def test_the_analysis_reports_delivered_delays_and_withheld_force(rehearsed: Path, tmp_path: Path) -> None:
     folder = tmp_path / "opened"
     shutil.copytree(rehearsed, folder)
     unblind(folder, "AB", "to see what was delivered")
@@ -76,13 +78,13 @@ def test_the_analysis_finds_delivered_delays_and_what_safety_withheld(rehearsed:
     rows = rows[rows["block"] == "pairs"]
     assert sorted(rows["level"]) == [20, 80]
     assert (rows["level_delivered"] - rows["level"]).abs().max() < 1.5
-    pairs, named = level_results(study)
+    pairs, named_levels = level_results(study)
     withheld = pairs.statistics["withheld"]
-    assert [(one["low"], one["n"]) for one in withheld] == [(20, 1), (80, 1)]
-    assert all(0 <= one["mean_percent"] <= one["most_percent"] < 5 for one in withheld)
-    assert not named.statistics["withheld"]
-    sections = ["".join(level_section(one, (), None)) for one in (pairs, named)]
-    assert ["Force held back by the safety layer" in one for one in sections] == [True, False]
-    (block,) = (one for one in study.levels if one.id == "named")
-    names = {one.condition: setting_name(one, block.settings) for one in block.settings}
+    assert [(row["low"], row["n"]) for row in withheld] == [(20, 1), (80, 1)]
+    assert all(0 <= row["mean_percent"] <= row["most_percent"] < 5 for row in withheld)
+    assert not named_levels.statistics["withheld"]
+    sections = ["".join(level_section(block, (), None)) for block in (pairs, named_levels)]
+    assert ["Force held back by the safety layer" in section for section in sections] == [True, False]
+    (block,) = (block for block in study.levels if block.id == "named")
+    names = {setting.condition: setting_name(setting, block.settings) for setting in block.settings}
     assert names == {"water": "Water, force delayed by 15 ms, 20 % of force updates lost"}

@@ -100,15 +100,15 @@ def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tm
     assert scenes == {DELAY in edits}
     assert sum(line["event"] == "responses" for line in lines) == 3
     unblind(tmp_path / "study", by="AK", reason="a test")
-    begun = [line for line in lines if line["event"] == "interval_started" and line["trial"] == 1][-1]
-    shown = read_watched(session, 1, interval=begun["interval"])
-    assert shown.ends_s == max(shown.times_s[-1], shown.marks[-1].at_s)
-    zero_s = shown.samples["time_ns"][0] * 1e-9 - shown.times_s[0]
+    start_line = [line for line in lines if line["event"] == "interval_started" and line["trial"] == 1][-1]
+    watched = read_watched(session, 1, interval=start_line["interval"])
+    assert watched.ends_s == max(watched.times_s[-1], watched.marks[-1].at_s)
+    zero_s = watched.samples["time_ns"][0] * 1e-9 - watched.times_s[0]
     origin_ns = read(session / "receipt.json")["clock"]["origin_ns"]
-    assert zero_s - origin_ns * 1e-9 == pytest.approx(begun["t_s"], abs=0.005)
+    assert zero_s - origin_ns * 1e-9 == pytest.approx(start_line["t_s"], abs=0.005)
 
 
-def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: Path) -> None:
+def test_levels_that_were_set_are_searched_for_and_not_found(study: Path) -> None:
     lines, key = lines_of(session_of(study)), read_key(study)
     protocol = complete_protocol(read(session_of(study) / "receipt.json")["protocol"], key)
     numbers = recorded_numbers(protocol, map(event_from, lines))
@@ -122,5 +122,5 @@ def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: P
 def test_a_level_that_was_set_is_found_in_a_note(session: Path) -> None:
     level = next(line["setting"] for line in lines_of(session) if len(str(line.get("setting"))) > 6)
     (session / "note.txt").write_text(f"it was {level!r}", encoding="utf-8", newline="\n")
-    warnings = [str(one) for one in verify_study(session.parents[2], None).warnings]
-    assert any("note.txt, line 1 reveals a condition, although the key is sealed" in one for one in warnings)
+    warnings = [str(warning) for warning in verify_study(session.parents[2], None).warnings]
+    assert any("note.txt, line 1 reveals a condition, although the key is sealed" in warning for warning in warnings)

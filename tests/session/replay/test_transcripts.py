@@ -19,7 +19,7 @@ SECRET = re.compile(r"\b(thin|thick|prompt|late|200|1400|0\.[1248](?!\.\d))\b")
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_what_is_said(
+def test_replays_report_the_recorded_findings(
     file: Path, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config
 ) -> None:
     @cache

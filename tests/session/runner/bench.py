@@ -42,7 +42,7 @@ PAIRS = '\n[designs.pairs]\nkind = "2ifc"\nfeedback = "always"\n'
 
 
 class Bench:
-    """A session at its first page or interval, whose windows paint at once while they paint."""
+    """A session at its first page or interval with windows that paint immediately."""
 
     def __init__(self, rig: Rig, protocol: Protocol) -> None:
         key = key_of(protocol)
@@ -77,7 +77,7 @@ class Bench:
         return self.servo.now_ns() / 1e9
 
     def swing(self) -> None:
-        """Move the hand to and fro, so that whatever liquid there is resists it."""
+        """Move the hand to and fro, so that any liquid resists it."""
         places = np.column_stack((TO_AND_FRO_M * np.sin(8 * SWING_S), 0 * SWING_S, 0 * SWING_S))
         self.hand.follow(SWING_S, places)
 
@@ -92,7 +92,7 @@ class Bench:
         return np.concatenate(forces)
 
     def look(self, ticks: int) -> None:
-        """Let ticks pass and look once."""
+        """Advance by ticks and poll the device once."""
         self.servo.advance(ticks)
         self.runner.poll()
 
@@ -131,7 +131,7 @@ STARTS: dict[str, Callable[[], Protocol]] = {
 
 @contextmanager
 def small_bench() -> Iterator[Bench]:
-    """Yield a session of the small study at its practice, with a hand that goes to and fro through a thick liquid."""
+    """Yield a session of the small study in its practice, with a hand that moves to and fro in a thick liquid."""
     protocol = small.protocol()
     with open_rig("scripted", study_settings(protocol, stream(1, "hand")), clock=VirtualClock()) as rig:
         bench = Bench(rig, protocol)
@@ -141,7 +141,7 @@ def small_bench() -> Iterator[Bench]:
 
 
 class Felt:
-    """A command for whatever happens on a bench; each tells what was felt."""
+    """Commands for events on a bench; each yields the forces and pages that follow."""
 
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
@@ -178,7 +178,7 @@ class Felt:
     def view(self) -> str:
         view = self.bench.runner.view(self.bench.servo.now_ns())
         assert view is not None
-        place_mm = [round(1000 * each) for each in view.position_m.tolist()]
+        place_mm = [round(1000 * coordinate_m) for coordinate_m in view.position_m.tolist()]
         return f"ball at {place_mm} mm{', hidden' * view.ball_hidden}, lit {view.task.lit}, target {view.task.target_m}"
 
     def answer(self, value: str) -> None:
@@ -188,9 +188,9 @@ class Felt:
     def _news(self) -> Iterator[str]:
         """Tell new lines, and where the session is."""
         for line in self.bench.journal.lines[self.seen :]:
-            told = {name: line[name] for name in TOLD if line.get(name) is not None}
+            fields = {name: line[name] for name in TOLD if line.get(name) is not None}
             values = [item["value"] for item in line.get("items", ())]
-            yield f"{line['event']} {told}{f' {values}' if values else ''}"
+            yield f"{line['event']} {fields}{f' {values}' if values else ''}"
         self.seen = len(self.bench.journal.lines)
         task = self.bench.runner.task
         elapsed = f", {task.elapsed_s:.1f} s" if task else ""
@@ -198,17 +198,19 @@ class Felt:
 
 
 def player(rig: Callable[[Protocol], Any]) -> Callable[[str, list[str]], Iterator[str]]:
-    """Return what plays transcripts, each on a rig of its own."""
+    """Return a function that plays each transcript on a new rig."""
 
     def play(start: str, lines: list[str]) -> Iterator[str]:
         protocol = STARTS[start]()
-        with rig(protocol) as opened:
-            felt = Felt(Bench(opened, protocol))
+        with rig(protocol) as open_rig:
+            felt = Felt(Bench(open_rig, protocol))
             felt.bench.swing()
             list(felt._news())
             names: dict[str, Any] = {"LESS": ANSWERS[0], "MORE": ANSWERS[1], "CONTINUE": CONTINUE, "STOP": BUTTON_STOP}
-            for kind, made in EVENTS.items():
-                names[kind] = lambda *told, made=made: felt.bench.runner.post(made(felt.bench.clock(), *told))
+            for kind, make_event in EVENTS.items():
+                names[kind] = lambda *arguments, make_event=make_event: felt.bench.runner.post(
+                    make_event(felt.bench.clock(), *arguments)
+                )
             yield from acts(lambda _: felt, names)(start, lines)
 
     return play

@@ -50,7 +50,7 @@ class Tape:
 
 
 class Played(World):
-    """A world, and a command for whatever happens in it: every method without an underscore."""
+    """A world with a command (public method) for each event in it."""
 
     def __init__(self, seed: int = 1, *, paints: bool = True) -> None:
         self.ready = True
@@ -65,12 +65,12 @@ class Played(World):
         self.runner.post(event)
 
     def go_on(self, steps: int = 1) -> None:
-        """Take some pages as they come, or targets."""
+        """Advance by some pages or targets."""
         for _ in range(steps):
             step(self)
 
     def to(self, block: str = "", *, delayed: bool = False, phase: str = "task") -> None:
-        """Go on to a phase, of a block where that is given, of a delayed trial."""
+        """Advance to a phase, optionally of a given block or of a delayed trial."""
         for _ in range(200):
             state = self.state
             there = state.phase is Phase[phase.upper()] and (not block or state.trial.block == block)
@@ -95,13 +95,13 @@ class Played(World):
         self.servo.telemetry.dropped = samples
 
     def paint(self, late_ms: float = 0.0, *, view: bool = True) -> None:
-        """Report a frame, of what is to be drawn now or of the newest sample, painted so much later."""
+        """Report a frame of the current view or of the newest sample, painted after a delay."""
         now_ns = self.servo.now_ns()
-        drawn = self.runner.view(now_ns) if view else None
-        self.runner.frame_shown(now_ns + round(late_ms * 1e6), drawn.sample_time_ns if drawn else now_ns)
+        view_now = self.runner.view(now_ns) if view else None
+        self.runner.frame_shown(now_ns + round(late_ms * 1e6), view_now.sample_time_ns if view_now else now_ns)
 
     def view(self) -> str:
-        """Tell what is to be drawn."""
+        """Yield the current view."""
         now_ns = self.servo.now_ns()
         view = self.runner.view(now_ns)
         if view is None:
@@ -124,7 +124,7 @@ class Played(World):
         self.ready = ready
 
     def pages_answer(self) -> None:
-        """Let each page say that its questions are shown, while it is presented."""
+        """Let each page report, while it is presented, that its questions are shown."""
 
         def answer(page: Any) -> None:
             for item in page.items if isinstance(page, QuestionnairePage) else ():
@@ -137,19 +137,19 @@ class Played(World):
         self.on_page = lambda page: self.post(Note(self.clock(), "mark", type(page).__name__))
 
     def _news(self) -> Iterator[str]:
-        """Yield what happened since the last time: what was asked for, in order, lines without what is 0, the state."""
+        """Yield the news: calls in order, journal lines without zeros, and the state."""
         words: list[str] = []
         log, lines, waited = self.seen
         pages = iter(self.pages[len(self.pages) - sum(name.endswith("Page") for name in self.log[log:]) :])
         for name in self.log[log:]:
             if lines < len(self.journal.lines) and self.journal.lines[lines]["event"] == name:
-                told = {key: value for key, value in self.journal.lines[lines].items() if value not in (None, 0)}
+                fields = {key: value for key, value in self.journal.lines[lines].items() if value not in (None, 0)}
                 waits = self.journal.waited[waited : waited + 1] == [name]
                 waited += waits
                 lines += 1
                 yield from [", ".join(words)] if words else []
                 words = []
-                rest = " ".join(f"{key}={_rounded(value)}" for key, value in told.items() if key != "event")
+                rest = " ".join(f"{key}={_rounded(value)}" for key, value in fields.items() if key != "event")
                 yield f"{name} {rest}{', waits' * waits}"
             else:
                 words.append(_page(next(pages)) if name.endswith("Page") else name)
@@ -160,17 +160,17 @@ class Played(World):
     def _state(self) -> str:
         runner, state, task = self.runner, self.state, self.runner.task
         trial = f", trial {state.trial.number}, attempt {state.attempt}" if state.phase is Phase.TASK else ""
-        done = f", {task.elapsed_s:g} s, {task.reached} reached, dwell {task.dwell:.4g}" if task else ""
+        task_words = f", {task.elapsed_s:g} s, {task.reached} reached, dwell {task.dwell:.4g}" if task else ""
         ended = ", ending" * runner.ending + ", finished" * runner.finished
         stalled = f", stalled: {runner.stalled}" if runner.stalled else ""
         servo = f"force {'on' if self.servo.force_is_on else 'off'}, scene {self.servo.scene}"
         tables = f"{self.journal.tables_written} tables"
-        return f"{state.phase.name.lower()}{trial}{done}{ended}{stalled}, {servo}, {tables}"
+        return f"{state.phase.name.lower()}{trial}{task_words}{ended}{stalled}, {servo}, {tables}"
 
 
 def _page(page: Any) -> str:
-    told = {field.name: getattr(page, field.name) for field in dataclasses.fields(page)}
-    return f"{type(page).__name__}({', '.join(f'{name}={told[name]!r}' for name in SHOWN if told.get(name))})"
+    fields = {field.name: getattr(page, field.name) for field in dataclasses.fields(page)}
+    return f"{type(page).__name__}({', '.join(f'{name}={fields[name]!r}' for name in SHOWN if fields.get(name))})"
 
 
 def _rounded(value: Any) -> Any:
@@ -179,8 +179,8 @@ def _rounded(value: Any) -> Any:
 
 def begun(start: str) -> Played:
     """Return a world after the commands of its start."""
-    made, _, commands = start.partition(":")
-    world: Played = value_of(f"world({made})", {"world": Played, "True": True, "False": False})
+    fields, _, commands = start.partition(":")
+    world: Played = value_of(f"world({fields})", {"world": Played, "True": True, "False": False})
     for command in filter(None, map(str.strip, commands.split(";"))):
         list(told(world, command, NAMES))
     list(world._news())

@@ -30,6 +30,6 @@ def rig_of(device: str, protocol: Protocol) -> object:
 
 
 @pytest.mark.parametrize(("name", "device"), PLAYED)
-def test_what_is_felt(name: str, device: str, pytestconfig: pytest.Config) -> None:
+def test_forces_and_pages_of_a_session_are_as_recorded(name: str, device: str, pytestconfig: pytest.Config) -> None:
     file = Path(__file__).parent / "felt" / f"{name}.txt"
     compare(file, played(file, player(partial(rig_of, device))), pytestconfig)

@@ -35,7 +35,7 @@ FILES = every(Path(__file__).parent / "transcripts", "rows runner")
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_the_runner_asks_for_what_it_did(file: Path, pytestconfig: pytest.Config) -> None:
+def test_the_runner_executes_the_recorded_commands(file: Path, pytestconfig: pytest.Config) -> None:
     compare(file, played(file, play), pytestconfig)
 
 
@@ -105,8 +105,8 @@ def test_the_force_ends_first_then_a_line_is_written_and_then_its_page_is_shown(
     """A trial's scene is loaded with the first frame of its page."""
     world.runner.on_change(lambda _state: world.log.append("told"))
     trial, pause = ["trial_started", "TaskPage", "load", "told"], ["paused", "PausePage", "told"]
-    written = 0
-    for kind, words, asked, waited, force_is_on, scene in (
+    lines_written = 0
+    for kind, words, page_fields, waited, force_is_on, scene in (
         (Begin, (), ["page_shown", "TextPage", "told"], [], True, 0),
         (Continue, (), ["page_left", *trial], ["page_left"], True, 1),
         (PauseRequested, ("operator",), ["rest", "trial_ended", *pause], [], True, 0),
@@ -133,11 +133,11 @@ def test_the_force_ends_first_then_a_line_is_written_and_then_its_page_is_shown(
         world.run(0.25)
         if kind is not None:
             world.runner.post(kind(world.clock(), *words))
-        assert (world.log, world.journal.waited) == (asked, waited)
+        assert (world.log, world.journal.waited) == (page_fields, waited)
         assert (world.servo.force_is_on, world.servo.scene) == (force_is_on, scene)
-        assert world.runner.cause == ("the cable" if "TroublePage" in asked else "")
-        assert {line["t_s"] for line in world.journal.lines[written:]} <= {world.clock()}
-        written = len(world.journal.lines)
+        assert world.runner.cause == ("the cable" if "TroublePage" in page_fields else "")
+        assert {line["t_s"] for line in world.journal.lines[lines_written:]} <= {world.clock()}
+        lines_written = len(world.journal.lines)
         world.log.clear()
         world.journal.waited.clear()
     outcomes = [(line["attempt"], line["outcome"], line["t_s"]) for line in world.journal.of("trial_ended")]
@@ -192,7 +192,9 @@ def test_lines_that_are_not_on_the_disk_stop_the_force_until_they_are(world: Wor
     assert (world.runner.finished, world.journal.status) == (True, "aborted")
 
 
-def test_what_a_full_disk_refused_is_written_once_a_second_later(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_write_refused_by_a_full_disk_is_repeated_once_per_second(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
     attempts: list[float] = []
     append = world.journal.append
 
@@ -220,7 +222,7 @@ def test_what_a_full_disk_refused_is_written_once_a_second_later(world: World, m
     assert [type(page) for page in world.pages] == [TextPage, TroublePage, TroublePage, TaskPage, PausePage]
 
 
-def test_a_servo_that_refuses_a_scene_ends_the_force_and_is_told_to_the_operator(world: World) -> None:
+def test_a_servo_that_refuses_a_scene_ends_the_force_and_informs_the_operator(world: World) -> None:
     world.runner.post(Begin(0.0))
     world.run(0.5)
     world.servo.refuses = ServoFault("its thread ended")
@@ -248,7 +250,7 @@ def test_a_rest_and_feedback_end_at_their_time(world: World, monkeypatch: pytest
     assert (world.runner.view(world.servo.now_ns()) is None) == (phase is Phase.FEEDBACK)
 
 
-def test_an_event_that_is_not_allowed_changes_nothing_and_those_posted_with_it_are_applied(world: World) -> None:
+def test_a_refused_event_does_not_prevent_the_events_posted_with_it(world: World) -> None:
     world.on_page = lambda page: world.runner.post(Note(world.clock(), "mark", type(page).__name__))
     world.runner.post(Begin(0.0))
     assert [line["text"] for line in world.journal.of("note")] == ["TextPage"], "posted while the page was presented"
@@ -298,7 +300,7 @@ def test_a_button_leaves_a_page_unless_it_was_pressed_before_the_page_was_there(
     assert world.state.phase is changes[-1] is Phase.COMPLETE
 
 
-def test_no_line_of_a_delayed_trial_names_condition_liquid_or_delay(world: World) -> None:
+def test_lines_of_a_delayed_trial_do_not_name_condition_liquid_or_delay(world: World) -> None:
     world.runner.post(Begin(0.0))
     while not world.runner.finished:
         step(world)

@@ -25,28 +25,28 @@ LESS, MORE = ANSWERS
 @pytest.fixture(params=["scripted", pytest.param("falcon-emulated", marks=pytest.mark.slow)])
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
     settings = study_settings(matching(), stream(1, "hand"))
-    with open_rig(request.param, settings, clock=VirtualClock()) as opened:
-        yield opened
+    with open_rig(request.param, settings, clock=VirtualClock()) as opened_rig:
+        yield opened_rig
 
 
 def at_setting(rig: Rig, *edits: tuple[str, str]) -> Bench:
     """Return a session whose first level is being set, its hand in motion."""
-    made = Bench(rig, setting(*edits))
-    made.swing()
-    assert ALONE in edits or made.state.adjusting is None, "the interval of the standard is not set"
-    made.to_setting()
-    return made
+    bench = Bench(rig, setting(*edits))
+    bench.swing()
+    assert ALONE in edits or bench.state.adjusting is None, "the interval of the standard is not set"
+    bench.to_setting()
+    return bench
 
 
 def samples_of(bench: Bench, seconds: float) -> Any:
     """Let time pass and return the samples."""
     bench.reader.read()
-    found = []
+    sample_batches = []
     for _ in range(round(seconds * 50)):
         bench.servo.advance(20)
         bench.runner.poll()
-        found.append(bench.reader.read().copy())
-    return np.concatenate(found)
+        sample_batches.append(bench.reader.read().copy())
+    return np.concatenate(sample_batches)
 
 
 def damping(samples: Any) -> float:
@@ -55,7 +55,7 @@ def damping(samples: Any) -> float:
     return float(-(samples["device_force_n"] * v).sum() / (v * v).sum())
 
 
-def test_steps_change_the_damping_in_the_hand_and_the_force_goes_on(rig: Rig) -> None:
+def test_steps_change_the_damping_without_interrupting_the_force(rig: Rig) -> None:
     bench = at_setting(rig)
     samples_of(bench, 0.5)
     level = bench.state.adjusting
@@ -74,7 +74,7 @@ def test_steps_change_the_damping_in_the_hand_and_the_force_goes_on(rig: Rig) ->
     assert (line["steps"], line["scene"]) == (10 * way, int(after["scene"][0]))
 
 
-def test_every_step_is_a_scene_of_its_own_at_the_ends_too(rig: Rig) -> None:
+def test_every_step_sets_a_new_scene_even_at_the_ends(rig: Rig) -> None:
     bench = at_setting(rig)
     samples_of(bench, 0.1)
     for steps in (500, 3, -500, -3):
@@ -84,7 +84,7 @@ def test_every_step_is_a_scene_of_its_own_at_the_ends_too(rig: Rig) -> None:
     assert scenes == [*range(scenes[0], scenes[0] + 4)]
 
 
-def test_a_delay_is_set_in_the_picture_and_no_scene_changes(rig: Rig) -> None:
+def test_setting_a_delay_changes_the_picture_but_not_the_scene(rig: Rig) -> None:
     bench = at_setting(rig, ALONE, DELAY)
     samples_of(bench, 0.3)
     level = bench.state.adjusting

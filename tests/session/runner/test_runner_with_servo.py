@@ -34,8 +34,8 @@ pytestmark = needs_servo
 
 @pytest.fixture
 def bench() -> Iterator[Bench]:
-    with small_bench() as made:
-        yield made
+    with small_bench() as new_bench:
+        yield new_bench
 
 
 def late(bench: Bench, clock: VirtualClock) -> None:
@@ -58,7 +58,7 @@ def suspended(bench: Bench, clock: VirtualClock) -> None:
 
 
 @pytest.mark.parametrize("freeze", [late, late_before_the_first_tick, late_where_nobody_reads, suspended])
-def test_a_freeze_within_a_trial_interrupts_it_and_it_comes_again(bench: Bench, freeze: Any) -> None:
+def test_a_freeze_during_a_trial_interrupts_and_repeats_it(bench: Bench, freeze: Any) -> None:
     clock = bench.servo.loop.clock
     assert isinstance(clock, VirtualClock)
     bench.look(800)
@@ -81,7 +81,7 @@ def test_a_freeze_within_a_trial_interrupts_it_and_it_comes_again(bench: Bench, 
     assert row["worst_gap_ms"] == pytest.approx(1)
 
 
-def test_a_freeze_while_a_page_is_read_interrupts_nothing(bench: Bench) -> None:
+def test_a_freeze_during_a_page_does_not_interrupt_the_session(bench: Bench) -> None:
     clock = bench.servo.loop.clock
     assert isinstance(clock, VirtualClock)
     bench.runner.post(PauseRequested(bench.clock(), "participant"))
@@ -94,7 +94,7 @@ def test_a_freeze_while_a_page_is_read_interrupts_nothing(bench: Bench) -> None:
     assert bench.journal.of("trial_ended")[-1]["outcome"] == "complete"
 
 
-def test_a_window_that_paints_nothing_for_the_rest_of_a_trial_has_it_interrupted(bench: Bench) -> None:
+def test_a_window_that_stops_painting_interrupts_the_trial(bench: Bench) -> None:
     for _ in range(20):
         bench.look(16)
         bench.runner.frame_shown(bench.servo.now_ns(), bench.servo.now_ns())
@@ -106,7 +106,7 @@ def test_a_window_that_paints_nothing_for_the_rest_of_a_trial_has_it_interrupted
 
 
 class Judged:
-    """A whole practice trial on the real servo, kept in a real session: what its row says of it."""
+    """The row of a whole practice trial on the real servo in a real session."""
 
     def __init__(self, folder: Path, *, late_ns: int = 0, opening_s: float = 0.0, stall_s: float = 0.0) -> None:
         study = small.protocol()
@@ -136,7 +136,7 @@ class Judged:
 
 
 def delay_error_ms(delay_ms: float) -> float:
-    """Return the mean error of the delay in a trial whose samples come irregularly, and frames at any time between."""
+    """Return the mean error of the delay in a trial with irregular samples and frames at any time between."""
     blocks = small.TABLES["blocks"] | {"practice": small.TABLES["blocks"]["practice"] | {"conditions": ["on_time"]}}
     conditions = small.TABLES["conditions"] | {"on_time": {"liquid": "thin", "delay_ms": delay_ms}}
     study = Protocol.model_validate(small.TABLES | {"blocks": blocks, "conditions": conditions})
@@ -182,8 +182,8 @@ def test_incidents_make_a_trial_invalid(
     tmp_path: Path, incident: dict[str, Any], valid: bool, gaps_ms: tuple[float, ...]
 ) -> None:
     row = Judged(tmp_path / "study", **incident).row
-    found = [row[name] for name in ("worst_gap_ms", "first_frame_gap_ms", "worst_frame_gap_ms")]
-    assert (row["valid"], found) == (valid, pytest.approx(list(gaps_ms), abs=1))
+    worst_gaps = [row[name] for name in ("worst_gap_ms", "first_frame_gap_ms", "worst_frame_gap_ms")]
+    assert (row["valid"], worst_gaps) == (valid, pytest.approx(list(gaps_ms), abs=1))
     assert row["duration_s"] == pytest.approx(3)
     assert row["delay_error_mean_ms"] == pytest.approx(3 + 1000 * SETTLED_S)
     assert row["delay_error_p95_ms"] < 25  # frames that never came have no age

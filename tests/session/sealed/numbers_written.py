@@ -24,7 +24,7 @@ def every_number(
     lines: Iterable[dict[str, Any]],
     presented: Callable[[dict[str, Any]], str | None],
 ) -> Trials:
-    """Return what a session's files hold about each trial, but answers and times of actions.
+    """Return the numbers in a session's files about each trial, except answers and times of actions.
 
     Sizes of files are among the numbers, and of each event, by interval, how many lines it has and how far apart.
 
@@ -38,35 +38,37 @@ def every_number(
         Returns what the trial that a line begins presented, None for a trial that is left out.
     """
     lines = list(lines)
-    found: Trials = {}
+    trials_by_condition: Trials = {}
     for line in lines:
         if line["event"] == "trial_started" and (what := presented(line)) is not None:
-            found[session.participant, line["trial"]] = (what, {})
+            trials_by_condition[session.participant, line["trial"]] = (what, {})
     interval = 0
     written_s: dict[tuple[Any, ...], float] = {}
     for line in lines:
         interval = 0 if line["event"] == "trial_started" else interval
         trial = (session.participant, line.get("trial"))
-        if trial in found and line["event"] not in ABOUT_ANSWERS:
-            found[trial][1].update(numbers(line, f"{line['event']} {line.get('interval', '')} "))
+        if trial in trials_by_condition and line["event"] not in ABOUT_ANSWERS:
+            trials_by_condition[trial][1].update(numbers(line, f"{line['event']} {line.get('interval', '')} "))
             interval = line.get("interval", interval)
             count = f"number of {line['event']} {interval}"
-            found[trial][1][count] = found[trial][1].get(count, 0.0) + 1
+            trials_by_condition[trial][1][count] = trials_by_condition[trial][1].get(count, 0.0) + 1
             if (before := written_s.get((*trial, count))) is not None:
-                found[trial][1][f"since the last {line['event']} {interval}"] = line["t_s"] - before
+                trials_by_condition[trial][1][f"since the last {line['event']} {interval}"] = line["t_s"] - before
             written_s[*trial, count] = line["t_s"]
-        if trial in found and line["event"] == "recorded":
+        if trial in trials_by_condition and line["event"] == "recorded":
             paths = [session.path / line[name] for name in ("recording", "recording_frames")]
-            found[trial][1].update((f"size {number}", path.stat().st_size) for number, path in enumerate(paths))
+            trials_by_condition[trial][1].update(
+                (f"size {number}", path.stat().st_size) for number, path in enumerate(paths)
+            )
     for name in ("trials", "intervals"):
         if not session.table(study, name).exists():
             continue
         with session.table(study, name).open(encoding="utf-8", newline="") as table:
             for row in csv.DictReader(table):
                 trial = (session.participant, int(row["trial"]))
-                if trial in found:
-                    found[trial][1].update(numbers(row, f"{name} {row.get('interval', '')} "))
-    return found
+                if trial in trials_by_condition:
+                    trials_by_condition[trial][1].update(numbers(row, f"{name} {row.get('interval', '')} "))
+    return trials_by_condition
 
 
 def numbers(said: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, float]]:
@@ -80,13 +82,13 @@ def numbers(said: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, float]]
 
 
 def told(trials: Trials) -> tuple[int, int, float]:
-    """Return how many conditions the nearest mean names, of how many trials, and the p of chance alone.
+    """Return how many conditions the nearest mean predicts, the number of trials, and the p under chance.
 
     By all numbers together and by each alone, whichever tells most; p is corrected for having tried all (Bonferroni).
     The means are those of the other sessions; every number counts by its standard deviation there.
     """
-    names = sorted({name for _, said in trials.values() for name in said})
-    values = np.array([[said.get(name, 0.0) for name in names] for _, said in trials.values()])
+    names = sorted({name for _, numbers_of_trial in trials.values() for name in numbers_of_trial})
+    values = np.array([[numbers_of_trial.get(name, 0.0) for name in names] for _, numbers_of_trial in trials.values()])
     people = np.array([person for person, _ in trials])
     conditions = np.array([condition for condition, _ in trials.values()])
     kinds = np.unique(conditions)

@@ -35,16 +35,16 @@ liquid = "light_oil"
 
 
 def numbers_of(folder: Path, block: str) -> Trials:
-    """Return what a study's folder holds about each trial of a block, with its condition."""
+    """Return the numbers in a study folder about each trial of a block, with its condition."""
     codes = blinding.read_key(folder).codes[block]
 
     def condition(line: dict[str, Any]) -> str | None:
         return codes[line["code"]] if line["block"] == block else None
 
-    found: Trials = {}
+    numbers: Trials = {}
     for session in StudyFolder(folder).sessions():
-        found |= every_number(session, "demo", raw(journal.read(session.journal)), condition)
-    return found
+        numbers |= every_number(session, "demo", raw(journal.read(session.journal)), condition)
+    return numbers
 
 
 @pytest.fixture(scope="module")
@@ -62,14 +62,14 @@ def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("block", ["liquids", "delays"])
-def test_nothing_written_tells_a_condition_better_than_chance(rehearsed: Path, block: str) -> None:
+def test_written_numbers_do_not_predict_conditions_better_than_chance(rehearsed: Path, block: str) -> None:
     right, trials, p = told(numbers_of(rehearsed, block))
     assert p > 0.01, f"{right} of {trials} trials were told (p = {p:.2g})"
 
 
 @pytest.mark.parametrize("block", ["liquids", "delays"])
-def test_after_unblinding_the_same_search_tells_them(rehearsed: Path, tmp_path: Path, block: str) -> None:
-    """So the search can fail, and what was sealed is there."""
+def test_written_numbers_predict_conditions_after_unblinding(rehearsed: Path, tmp_path: Path, block: str) -> None:
+    """This proves that the search can succeed and that the sealed values exist."""
     folder = tmp_path / "opened"
     shutil.copytree(rehearsed, folder)
     assert unblind(folder, "AB", "to see that it tells").left == ()

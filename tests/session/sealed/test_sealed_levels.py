@@ -69,7 +69,7 @@ def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def answer_blindly(
     _self: object, _study: object, design: Any, _s: Any, _b: Any, draw: Callable[[], float], _course: Any
 ) -> Any:
-    """Answer by the draw alone, whatever was felt."""
+    """Answer at random, independent of the force."""
     share = draw()
     if design.reply == "choice":
         return design.answers[int(share * len(design.answers))]
@@ -77,7 +77,7 @@ def answer_blindly(
 
 
 class BlindSetting:
-    """Steps by the draw alone, beyond the end that is near in some settings, independent of the force."""
+    """An observer with random steps, independent of the force; some pass the nearer end."""
 
     def __init__(self, _attended: Any, draw: Callable[[], float]) -> None:
         self._steps = [*[1] * 7, 80, -90, -7, 3, *(round(9 * draw()) - 4 or 1 for _ in range(4)), 0]
@@ -93,13 +93,13 @@ def run(protocol: Path, folder: Path, secret: int) -> Path:
     with collecting() as markers:
         rehearse(protocol, participants=1, seed=4, results=folder)
     (folder / "markers.jsonl").write_text(
-        "".join(f"{one.text}\n" for one in markers.markers), encoding="utf-8", newline="\n"
+        "".join(f"{marker.text}\n" for marker in markers.markers), encoding="utf-8", newline="\n"
     )
     return folder
 
 
 @pytest.fixture(scope="module")
-def blindly() -> Any:
+def blind_answers() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Comparison, "answer", answer_blindly)
         patch.setattr(RehearsedSession, "_perceived_features", lambda _self, _trial: NO_FEATURES)
@@ -108,45 +108,51 @@ def blindly() -> Any:
 
 
 @pytest.fixture(scope="module")
-def first(protocol: Path, blindly: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def first(protocol: Path, blind_answers: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run(protocol, tmp_path_factory.mktemp("first") / "study", 1)
 
 
 @pytest.fixture(scope="module")
-def second(protocol: Path, blindly: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def second(protocol: Path, blind_answers: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run(protocol, tmp_path_factory.mktemp("second") / "study", 3)
 
 
 def said_in(folder: Path) -> Said:
-    """Return what every file of a study says, but for the key and for what may differ."""
-    found: Said = {}
+    """Return the content of every file of a study except the key and fields that may differ."""
+    contents: Said = {}
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
         if path.is_dir() or path.name in {"key.sealed", "checksums.sha256", "fingerprints.txt"}:
-            found[name] = None
+            contents[name] = None
         elif path.suffix == ".csv":
             with path.open(newline="", encoding="utf-8") as file:
-                found[name] = [
+                contents[name] = [
                     {column: cell for column, cell in row.items() if not column.endswith("_at")}
                     for row in csv.DictReader(file)
                 ]
         elif path.suffix == ".parquet":
-            found[name] = path.stat().st_size
+            contents[name] = path.stat().st_size
         else:
             text = path.read_text(encoding="utf-8")
             parts = text.splitlines() if path.suffix == ".jsonl" else [text]
-            found[name] = [shown(json.loads(part)) for part in parts] if path.suffix.startswith(".json") else text
+            contents[name] = (
+                [without_hidden(json.loads(part)) for part in parts] if path.suffix.startswith(".json") else text
+            )
             if path.name == "journal.jsonl":  # the recorder writes its own lines whenever it is done
-                rest = [{**line, "n": 0} for line in found[name] if line["event"] != "recorded"]
-                saved = [{**line, "n": 0, "t_s": 0} for line in found[name] if line["event"] == "recorded"]
-                found[name] = rest + sorted(saved, key=lambda line: str(line["recording"]))
-    return found
+                rest = [{**line, "n": 0} for line in contents[name] if line["event"] != "recorded"]
+                saved = [{**line, "n": 0, "t_s": 0} for line in contents[name] if line["event"] == "recorded"]
+                contents[name] = rest + sorted(saved, key=lambda line: str(line["recording"]))
+    return contents
 
 
-def shown(value: Any) -> Any:
+def without_hidden(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: shown(inner) for name, inner in value.items() if name not in HIDDEN and not name.endswith("_at")}
-    return [shown(inner) for inner in value] if isinstance(value, list) else value
+        return {
+            name: without_hidden(inner)
+            for name, inner in value.items()
+            if name not in HIDDEN and not name.endswith("_at")
+        }
+    return [without_hidden(inner) for inner in value] if isinstance(value, list) else value
 
 
 def operator_views(folder: Path, protocol: Path) -> list[Any]:
@@ -165,38 +171,40 @@ def operator_views(folder: Path, protocol: Path) -> list[Any]:
     return views
 
 
-def presented(folder: Path) -> list[Any]:
+def presented_levels(folder: Path) -> list[Any]:
     """Return level and arrangement of each trial, and the condition of those of statements."""
     (place,) = StudyFolder(folder).sessions()
     lines, codes = (
         raw(blinding.open_events(journal.read(place.journal), read_key(folder))),
         read_key(folder).codes["said"],
     )
-    started = [line for line in lines if line["event"] == "trial_started"]
-    return [(line.get("level"), line.get("arrangement"), codes.get(line["code"], "")) for line in started]
+    start_lines = [line for line in lines if line["event"] == "trial_started"]
+    return [(line.get("level"), line.get("arrangement"), codes.get(line["code"], "")) for line in start_lines]
 
 
 def test_sessions_under_two_keys_present_different_levels_and_conditions(first: Path, second: Path) -> None:
-    one, other = presented(first), presented(second)
-    assert len(one) == len(other) > 30
-    assert sum(it != another for it, another in zip(one, other, strict=True)) > 15
-    assert [it[2] for it in one if it[2]] != [it[2] for it in other if it[2]]
+    first_levels, second_levels = presented_levels(first), presented_levels(second)
+    assert len(first_levels) == len(second_levels) > 30
+    assert sum(it != another for it, another in zip(first_levels, second_levels, strict=True)) > 15
+    assert [trial[2] for trial in first_levels if trial[2]] != [trial[2] for trial in second_levels if trial[2]]
 
 
 def test_sessions_under_two_keys_write_the_same_but_for_sealed_fields(first: Path, second: Path) -> None:
-    one, other = said_in(first), said_in(second)
-    assert len(one) > 8
-    assert {name for name in one if one[name] != other.get(name)} | (set(other) - set(one)) == set()
+    first_lines, second_lines = said_in(first), said_in(second)
+    assert len(first_lines) > 8
+    assert {name for name in first_lines if first_lines[name] != second_lines.get(name)} | (
+        set(second_lines) - set(first_lines)
+    ) == set()
 
 
-def test_a_planted_leak_makes_them_differ(first: Path, protocol: Path, blindly: Any, tmp_path: Path) -> None:
-    """One measure of one event is not sealed."""
-    with blindly.context() as patch:
+def test_a_planted_leak_makes_them_differ(first: Path, protocol: Path, blind_answers: Any, tmp_path: Path) -> None:
+    """One measure of one event is left unsealed."""
+    with blind_answers.context() as patch:
         left = {**blinding._SEALED_FIELDS, IntervalEnded: SEALED - {"force_peak_n"}}
         patch.setattr(blinding, "_SEALED_FIELDS", left)
         other = said_in(run(protocol, tmp_path / "planted", 3))
-    one = said_in(first)
-    assert {name.rpartition("/")[2] for name in one if one[name] != other.get(name)} == {"journal.jsonl"}
+    lines = said_in(first)
+    assert {name.rpartition("/")[2] for name in lines if lines[name] != other.get(name)} == {"journal.jsonl"}
 
 
 def test_the_operator_sees_the_same_under_two_keys(first: Path, second: Path, protocol: Path) -> None:
@@ -207,7 +215,7 @@ def test_the_operator_sees_the_same_under_two_keys(first: Path, second: Path, pr
 
 @pytest.fixture(scope="module")
 def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a study of one block of pairs, answered by what was felt."""
+    """Return a study with one block of pairs, answered from the simulated forces."""
     folder = tmp_path_factory.mktemp("pairs")
     path = folder / "pairs.toml"
     path.write_text(text_of(("repetitions = 8", "repetitions = 4"), *SHORT[1:]), encoding="utf-8", newline="\n")
@@ -217,24 +225,24 @@ def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def numbers_of(folder: Path, what: str) -> Trials:
     """Return every number written about each trial, with its ``what``: level, standard or arrangement."""
     key = read_key(folder)
-    found: Trials = {}
+    numbers: Trials = {}
     for session in StudyFolder(folder).sessions():
         lines = journal.read(session.journal)
         presented = {line["n"]: line for line in raw(blinding.open_events(lines, key))}
-        found |= every_number(session, "levels", raw(lines), lambda line, of=presented: str(of[line["n"]][what]))
-    return found
+        numbers |= every_number(session, "levels", raw(lines), lambda line, of=presented: str(of[line["n"]][what]))
+    return numbers
 
 
 @pytest.mark.parametrize("what", ["level", "standard", "arrangement"])
-def test_no_number_that_is_written_tells_what_was_presented(sessions: Path, what: str) -> None:
+def test_written_numbers_do_not_predict_the_presented_levels(sessions: Path, what: str) -> None:
     right, trials, p = told(numbers_of(sessions, what))
     assert trials == SESSIONS * 24
     assert p > 0.01, f"{right} of {trials} trials were told (p = {p:.2g})"
 
 
 @pytest.mark.parametrize("what", ["level", "standard", "arrangement"])
-def test_after_unblinding_the_same_search_tells_it(sessions: Path, tmp_path: Path, what: str) -> None:
-    """So the search can fail, and what was sealed is there."""
+def test_written_numbers_predict_levels_after_unblinding(sessions: Path, tmp_path: Path, what: str) -> None:
+    """This proves that the search can succeed and that the sealed values exist."""
     folder = tmp_path / "opened"
     shutil.copytree(sessions, folder)
     assert unblind(folder, "AB", "to see that it tells").left == ()

@@ -33,8 +33,8 @@ NAMED = (
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = source_bytes("demo").decode()
     for pattern, word in NAMED:
-        text, found = re.subn(pattern, word, text, flags=re.MULTILINE)
-        assert found, pattern
+        text, count = re.subn(pattern, word, text, flags=re.MULTILINE)
+        assert count, pattern
     path = tmp_path_factory.mktemp("named") / "named.toml"
     path.write_text(text, encoding="utf-8", newline="\n")
     return path
@@ -48,9 +48,9 @@ def rehearsed(protocol: Path) -> tuple[Path, Collector]:
 
 def words_found(collector: Collector, protocol: Path) -> list[str]:
     """Return the words of the protocol's conditions in the markers, but for moments and counts."""
-    found = telltales(load(str(protocol)))
-    said = [json.loads(marker.text) for marker in collector.markers]
-    return [word for one in said for word in found.in_text(json.dumps(one | dict.fromkeys(COUNTS)))]
+    words = telltales(load(str(protocol)))
+    marker_fields = [json.loads(marker.text) for marker in collector.markers]
+    return [word for fields in marker_fields for word in words.in_text(json.dumps(fields | dict.fromkeys(COUNTS)))]
 
 
 def test_markers_are_the_journals_events_with_their_codes(rehearsed: tuple[Path, Collector]) -> None:
@@ -63,11 +63,11 @@ def test_markers_are_the_journals_events_with_their_codes(rehearsed: tuple[Path,
     assert [marker.event for marker in journalled] == [line["event"] for line in marked]
     assert {"trial_started", "trial_ended", "choice", "responses"} < set(collector.events)
     for marker, line in zip(journalled, marked, strict=True):
-        said = json.loads(marker.text)
-        assert said["t_s"] == line["t_s"]
-        assert said.get("code") == line.get("code")
+        content = json.loads(marker.text)
+        assert content["t_s"] == line["t_s"]
+        assert content.get("code") == line.get("code")
     assert not any("sealed" in marker.text or "value" in marker.text for marker in collector.markers)
 
 
-def test_no_marker_tells_a_condition(rehearsed: tuple[Path, Collector], protocol: Path) -> None:
+def test_markers_do_not_reveal_a_condition(rehearsed: tuple[Path, Collector], protocol: Path) -> None:
     assert words_found(rehearsed[1], protocol) == []

@@ -25,23 +25,23 @@ STUDIES = [pytest.param(name, marks=() if name == QUICK else pytest.mark.nightly
 
 def presented_in(folder: Path, block: str) -> Trials:
     """Return every number about each trial of a block, with its condition, or the order of its intervals."""
-    key, found = read_key(folder), {}
+    key, numbers = read_key(folder), {}
     for session in StudyFolder(folder).sessions():
         lines = journal.read(session.journal)
-        started = {line.n: line for line in open_events(lines, key) if isinstance(line, TrialStarted)}
+        start_lines = {line.n: line for line in open_events(lines, key) if isinstance(line, TrialStarted)}
 
-        def presented(line: dict[str, Any], of: dict[int, TrialStarted] = started) -> str | None:
+        def presented(line: dict[str, Any], of: dict[int, TrialStarted] = start_lines) -> str | None:
             trial = of[line["n"]]
             if trial.block != block or trial.phase != "main" or trial.catch:
                 return None
             return trial.arrangement or key.codes[block][trial.code]
 
-        found |= every_number(session, folder.name, raw(lines), presented)
-    return found
+        numbers |= every_number(session, folder.name, raw(lines), presented)
+    return numbers
 
 
 @pytest.mark.parametrize("study", STUDIES)
-def test_no_number_tells_what_was_presented(study: str, tmp_path: Path) -> None:
+def test_written_numbers_of_shipped_studies_do_not_predict_conditions(study: str, tmp_path: Path) -> None:
     folder = rehearse(study, participants=PEOPLE, seed=31, results=tmp_path / study, recordings=False)
     for block in load(study).blocks:
         trials = presented_in(folder, block)

@@ -50,11 +50,11 @@ def test_by_default_it_keeps_apart_from_participants(tmp_path: Path, monkeypatch
 
 
 def test_the_folder_is_sound_and_every_row_says_simulated(twelve: Path) -> None:
-    found = verify_study(twelve)
-    assert (found.errors, found.warnings, found.sessions) == ((), (), 12)
-    for name, held in tables(twelve).items():
-        assert held, name
-        assert {row["simulated"] for row in held} == {"true"}, name
+    verification = verify_study(twelve)
+    assert (verification.errors, verification.warnings, verification.sessions) == ((), (), 12)
+    for name, rows in tables(twelve).items():
+        assert rows, name
+        assert {row["simulated"] for row in rows} == {"true"}, name
 
 
 def test_a_receipt_that_was_changed_with_its_proofs_differs_from_the_journal(twelve: Path, tmp_path: Path) -> None:
@@ -77,71 +77,77 @@ def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Pa
 
 
 @pytest.mark.parametrize(("name", "block", "task_s"), [("compared", "pairs", 4.0), ("levels", "viscosity", 1.0)])
-def test_who_senses_well_chooses_the_stronger_interval_and_takes_as_long_as_the_tasks(
+def test_a_precise_observer_chooses_the_stronger_interval_and_takes_the_tasks_time(
     tmp_path: Path, name: str, block: str, task_s: float
 ) -> None:
     text = text_of(name).replace("repetitions = 40", "repetitions = 4")
     (tmp_path / "study.toml").write_text(text, encoding="utf-8", newline="\n")
-    felt = {where: made for where, made in made_up(tmp_path / "study.toml").items() if where[0] == block}
-    study = rehearse_answers(tmp_path / "study.toml", participants=1, seed=1, results=tmp_path / "s", features=felt)
+    feelings = {where: feeling for where, feeling in made_up(tmp_path / "study.toml").items() if where[0] == block}
+    study = rehearse_answers(tmp_path / "study.toml", participants=1, seed=1, results=tmp_path / "s", features=feelings)
     (session,) = StudyFolder(study).sessions()
     lines = open_events(journal.read(session.journal), read_key(study))
-    told, stronger, right = {line.event: line for line in lines[:1]}, {"SC": "second", "CS": "first"}, list[bool]()
+    begin_lines, stronger, right = (
+        {line.event: line for line in lines[:1]},
+        {"SC": "second", "CS": "first"},
+        list[bool](),
+    )
     for line in lines:
-        if line.event == "responses" and (told["trial_started"].level or 1.0) > 0.3:
-            right.append(line.items[0].value == stronger[told["trial_started"].arrangement])
+        if line.event == "responses" and (begin_lines["trial_started"].level or 1.0) > 0.3:
+            right.append(line.items[0].value == stronger[begin_lines["trial_started"].arrangement])
         if line.event == "interval_ended":
-            assert line.t_s - told["interval_started"].t_s == pytest.approx(task_s)
+            assert line.t_s - begin_lines["interval_started"].t_s == pytest.approx(task_s)
         if line.event == "interval_started" and line.interval == 2:
-            assert line.t_s - told["interval_ended"].t_s == pytest.approx(0.05 + 0.6 + 0.001)
-        told[line.event] = line
+            assert line.t_s - begin_lines["interval_ended"].t_s == pytest.approx(0.05 + 0.6 + 0.001)
+        begin_lines[line.event] = line
     assert sum(right) >= 0.9 * len(right) > 3
-    assert told["session_ended"].t_s == told["responses"].t_s
+    assert begin_lines["session_ended"].t_s == begin_lines["responses"].t_s
 
 
 def test_fewer_participants_answer_as_the_first_of_many(twelve: Path, tmp_path: Path) -> None:
     few = tables(rehearse_answers("rek2024", participants=3, seed=1, results=tmp_path / "few", features=FELT))
     many = tables(twelve)
-    assert all(many[name] == held for name, held in few.items() if "sub-" in name)
+    assert all(many[name] == rows for name, rows in few.items() if "sub-" in name)
 
 
 @needs_servo
-def test_who_feels_what_was_felt_in_a_rehearsal_answers_as_in_it(tmp_path: Path) -> None:
-    held = rehearse("demo", participants=1, seed=3, results=tmp_path / "held", recordings=False)
-    felt = condition_features(load("demo"), seed=3, people=1)
-    assert all(len(once) == 1 for once in felt.values()), "otherwise which of them is felt is drawn"
-    answered = rehearse_answers("demo", participants=1, seed=3, results=tmp_path / "answered", features=felt)
-    asked = ("trial", "code", "item", "number", "response", "changes")
-    one, other = (
+def test_answers_alone_equal_those_of_a_rehearsal_with_the_same_features(tmp_path: Path) -> None:
+    rehearsed = rehearse("demo", participants=1, seed=3, results=tmp_path / "held", recordings=False)
+    features = condition_features(load("demo"), seed=3, people=1)
+    assert all(len(once) == 1 for once in features.values()), "otherwise which of them is felt is drawn"
+    answered = rehearse_answers("demo", participants=1, seed=3, results=tmp_path / "answered", features=features)
+    columns = ("trial", "code", "item", "number", "response", "changes")
+    lived, answered_only = (
         [
-            [row[name] for name in asked]
+            [row[name] for name in columns]
             for name_, held_ in tables(folder).items()
             if "responses" in name_
             for row in held_
         ]
-        for folder in (held, answered)
+        for folder in (rehearsed, answered)
     )
-    assert one == other
+    assert lived == answered_only
 
 
 @needs_servo
-def test_what_is_felt_is_what_each_condition_gives(tmp_path: Path) -> None:
+def test_features_are_computed_for_every_condition(tmp_path: Path) -> None:
     study = load("demo")
-    felt = condition_features(study, seed=1, people=2)
-    assert felt.keys() == {(block.id, condition) for block in study.blocks.values() for condition in block.conditions}
-    for (block, condition), lived in felt.items():
+    features = condition_features(study, seed=1, people=2)
+    assert features.keys() == {
+        (block.id, condition) for block in study.blocks.values() for condition in block.conditions
+    }
+    for (block, condition), lived in features.items():
         assert len(lived) == 2 * study.blocks[block].repetitions
-        for one in lived:
-            assert one.force_mean_n > 0
-            assert one.delay_s == pytest.approx(study.delay_s(condition), abs=0.015)
+        for feeling in lived:
+            assert feeling.force_mean_n > 0
+            assert feeling.delay_s == pytest.approx(study.delay_s(condition), abs=0.015)
     assert not any(tmp_path.iterdir())
 
 
 @needs_servo
 def test_each_liquid_of_a_pair_is_felt_in_its_own_interval() -> None:
     text = text_of("compared").replace("repetitions = 40", "repetitions = 2").replace("nspm = 9", "nspm = 16")
-    felt = condition_features(parse(text.encode(), "compared.toml"), seed=1, people=1)
-    thin, thick = ([one.force_mean_n for one in felt["pairs", liquid]] for liquid in ("thin", "thick"))
+    features = condition_features(parse(text.encode(), "compared.toml"), seed=1, people=1)
+    thin, thick = ([feeling.force_mean_n for feeling in features["pairs", liquid]] for liquid in ("thin", "thick"))
     assert max(thin) < min(thick)
 
 
@@ -156,6 +162,6 @@ def test_ended_by_the_user_it_leaves_whole_sessions_and_their_table(
     folder = tmp_path / "rek2024"
     with pytest.raises(KeyboardInterrupt):
         rehearse_answers("rek2024", participants=9, seed=1, results=folder, features=FELT, progress=enough)
-    found = verify_study(folder)
-    assert (found.errors, found.sessions) == ((), 3)
+    verification = verify_study(folder)
+    assert (verification.errors, verification.sessions) == ((), 3)
     assert load_study(folder).n == 3

@@ -45,8 +45,8 @@ def test_the_hand_keeps_the_pace_and_feels_a_damper_faded_in_over_300_ms(study_f
             b_nspm = -np.sum(force_n * velocity_mps) / np.sum(velocity_mps**2)
             assert force_n == pytest.approx(-b_nspm * velocity_mps, abs=1e-3)
             dampings.add(round(float(b_nspm), 2))
-            judged = (since_s >= task.lead_s) & (since_s <= task.limit_s)
-            rms_mps = np.sqrt(np.mean(np.sum(velocity_mps[judged] ** 2, axis=1)))
+            is_judged = (since_s >= task.lead_s) & (since_s <= task.limit_s)
+            rms_mps = np.sqrt(np.mean(np.sum(velocity_mps[is_judged] ** 2, axis=1)))
             assert rms_mps == pytest.approx(task.rms_speed_mps, rel=0.1)
             faded_s = since_s[samples.limiters & LIMITER_FADE != 0]
             assert faded_s.max() == pytest.approx(0.3, abs=0.01)

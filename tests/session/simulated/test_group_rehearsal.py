@@ -19,7 +19,7 @@ from tests.protocol.groups.grouped import GROUPS, STUDY
 pytestmark = [pytest.mark.slow, needs_servo]
 
 
-def told(study: Path, session: SessionFolder) -> tuple[str, list[tuple[Any, ...]], list[Any]]:
+def session_content(study: Path, session: SessionFolder) -> tuple[str, list[tuple[Any, ...]], list[Any]]:
     """Return the group, the trials and the answers of a session."""
     lines = raw(open_events(journal.read(session.journal), read_key(study)))
     trials = {line["trial"]: (line["block"], line["code"]) for line in lines if line["event"] == "trial_started"}
@@ -45,16 +45,16 @@ def test_a_resumed_participant_stays_in_the_group_and_answers_alike(study: Path,
     groups = set()
     (folder / "fingerprints.txt").unlink()
     for session in StudyFolder(folder).sessions():
-        whole = told(folder, session)
+        whole = session_content(folder, session)
         groups.add(whole[0])
         content = session.journal.read_bytes()
         session.journal.write_bytes(content[: round(share * len(content))])
-        for made in (*session.path.glob("*.csv"), session.checksums):
-            made.unlink()
+        for derived_file in (*session.path.glob("*.csv"), session.checksums):
+            derived_file.unlink()
         text = session.receipt.read_text("utf-8").replace('"status": "completed"', '"status": "unfinished"')
         session.receipt.write_text(text, encoding="utf-8", newline="\n")
         resume_rehearsal(session.path, protocol=study.parent / "grouped.toml")
-        assert told(folder, session) == whole
+        assert session_content(folder, session) == whole
         assert reproduce_session(session.path).differences == []
     assert groups == {"first_thin", "first_thick"}
     assert verify_study(folder, None).errors == ()

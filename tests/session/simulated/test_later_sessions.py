@@ -57,10 +57,10 @@ def answers_in(session: SessionFolder, study: Path, block: str) -> list[Any]:
 def test_each_group_completes_its_own_sessions(rehearsed: Callable[..., Path], tmp_path: Path) -> None:
     source = tmp_path / "grouped.toml"
     source.write_text(STUDY_OF_SESSIONS, encoding="utf-8", newline="\n")
-    told: list[str] = []
-    study = rehearsed(source, participants=4, seed=8, results=tmp_path / "study", progress=told.append)
-    found = verify_study(study)
-    assert (found.errors, found.warnings, found.sessions) == ((), (), 8)
+    messages: list[str] = []
+    study = rehearsed(source, participants=4, seed=8, results=tmp_path / "study", progress=messages.append)
+    verification = verify_study(study)
+    assert (verification.errors, verification.warnings, verification.sessions) == ((), (), 8)
     sessions: dict[str, list[SessionFolder]] = {}
     for session in StudyFolder(study).sessions():
         sessions.setdefault(session.participant, []).append(session)
@@ -81,8 +81,8 @@ def test_a_later_session_is_resumed_with_the_same_answers(tmp_path: Path) -> Non
     (study / "fingerprints.txt").unlink()
     content = session.journal.read_bytes()
     session.journal.write_bytes(content[: len(content) // 2])
-    for made in (*session.path.glob("*.csv"), session.checksums):
-        made.unlink()
+    for derived_file in (*session.path.glob("*.csv"), session.checksums):
+        derived_file.unlink()
     text = session.receipt.read_text("utf-8").replace('"status": "completed"', '"status": "unfinished"')
     session.receipt.write_text(text, encoding="utf-8", newline="\n")
     resume_rehearsal(session.path, protocol=source)
@@ -90,7 +90,9 @@ def test_a_later_session_is_resumed_with_the_same_answers(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("rehearsed", [rehearse, rehearse_answers])
-def test_no_session_follows_one_that_ended_early(rehearsed: Callable[..., Path], tmp_path: Path) -> None:
+def test_a_participant_whose_session_ended_early_has_no_later_session(
+    rehearsed: Callable[..., Path], tmp_path: Path
+) -> None:
     source = tmp_path / "grouped.toml"
     text = (
         STUDY_OF_SESSIONS.replace('["hello", "thin", "thick"]', '["hello", "screening", "thin", "thick"]') + CRITERION

@@ -144,7 +144,7 @@ def test_the_prediction_counts_trials_of_intervals_and_others_apart(
     )  # fmt: skip
 
 
-def test_every_surface_says_that_no_trial_was_delivered(
+def test_every_output_states_that_no_trial_was_delivered(
     thick: Path, rehearsed: Path, told: list[str], tmp_path: Path
 ) -> None:
     would = SENTENCE.replace("were", "would").replace("not delivered", "not be delivered")
@@ -157,7 +157,7 @@ def test_every_surface_says_that_no_trial_was_delivered(
     assert f"Note: {would}, predicted for a delay of 1 tick." in checked
     assert told[0].startswith("P001: 0 responses")
     assert told[0].endswith(f"; {SENTENCE}")
-    assert [str(one) for one in verify_study(rehearsed).warnings] == [f"data/sub-P001/ses-01: {SENTENCE}"]
+    assert [str(warning) for warning in verify_study(rehearsed).warnings] == [f"data/sub-P001/ses-01: {SENTENCE}"]
     assert verify_study(rehearsed).is_sound
     (facts,) = sessions(rehearsed.parent, {})
     assert (status_chip(facts)[2], str(facts.missing), facts.is_counted) == ("Incomplete", SENTENCE, False)
@@ -172,11 +172,11 @@ def test_every_surface_says_that_no_trial_was_delivered(
 
 def test_an_incomplete_session_is_not_analysed_until_a_person_includes_it(rehearsed: Path, tmp_path: Path) -> None:
     assert load_study(rehearsed).n == 0
-    listed = StudyFolder(rehearsed).exclusions
-    content = listed.read_bytes()
-    listed.unlink()  # as if the program had ended before it wrote the list
+    exclusion_list = StudyFolder(rehearsed).exclusions
+    content = exclusion_list.read_bytes()
+    exclusion_list.unlink()  # as if the program had ended before it wrote the list
     assert load_study(rehearsed).n == 0
-    listed.write_bytes(content)
+    exclusion_list.write_bytes(content)
     include(rehearsed, "P001", 1, by="AB", reason="the other trials are enough")
     assert load_study(rehearsed).n == 1
     (facts,) = sessions(rehearsed.parent, {})
@@ -184,7 +184,7 @@ def test_an_incomplete_session_is_not_analysed_until_a_person_includes_it(rehear
 
 
 @pytest.mark.usefixtures("quick_pdf")
-def test_report_and_export_say_who_lost_how_many_trials_of_which_kind(rehearsed: Path, tmp_path: Path) -> None:
+def test_report_and_export_state_the_lost_trials_of_each_participant(rehearsed: Path, tmp_path: Path) -> None:
     unblind(rehearsed, "AB", "a test")
     CliRunner().invoke(commands, ["report", str(rehearsed), "--to", str(tmp_path / "report")], catch_exceptions=False)
     page = re.sub(r"<[^>]+>", " ", (tmp_path / "report" / "report.html").read_text(encoding="utf-8"))

@@ -51,7 +51,7 @@ def test_the_ball_stays_in_the_tank_and_ends_before_the_task_does(task: AnyTask)
     assert np.ptp(places_m[:, 0]) > 0.02
 
 
-def test_a_hidden_ball_is_drawn_during_the_lead_alone() -> None:
+def test_a_hidden_ball_is_drawn_only_during_the_lead() -> None:
     task = Follow(kind="follow", lead_s=1.0)
     ball = ProgrammedBall(task, TANK_M, hidden_after_lead=True)
     assert not ball.view(0.5).ball_hidden
@@ -63,9 +63,9 @@ def test_a_stroke_goes_straight_from_rest_to_rest_at_its_mean_pace() -> None:
     begin_m, end_m, pace_mps = np.array([0.01, -0.02, 0.03]), np.array([0.05, 0.01, 0.03]), 0.1
     places_m = np.vstack([begin_m, observers._stroke(begin_m, end_m, pace_mps)])
     assert places_m[-1] == pytest.approx(end_m, abs=1e-15)
-    done = (places_m - begin_m) @ (end_m - begin_m) / 0.05**2
-    assert places_m == pytest.approx(begin_m + done[:, None] * (end_m - begin_m), abs=1e-15)
-    steps = np.diff(done)
+    share_of_way = (places_m - begin_m) @ (end_m - begin_m) / 0.05**2
+    assert places_m == pytest.approx(begin_m + share_of_way[:, None] * (end_m - begin_m), abs=1e-15)
+    steps = np.diff(share_of_way)
     assert (steps > 0).all()
     assert steps == pytest.approx(steps[::-1], abs=1e-12)
     assert steps.max() * len(steps) == pytest.approx(1.875, rel=0.01)
@@ -159,7 +159,7 @@ def test_a_hand_rests_at_the_start_of_a_paced_task_and_else_returns_to_the_middl
 
 
 @pytest.mark.parametrize("delays", [True, False])
-def test_without_noise_an_observer_senses_what_is_presented(delays: bool) -> None:
+def test_an_observer_without_noise_perceives_the_presented_value(delays: bool) -> None:
     observer: Any = SimpleNamespace(_attended=SimpleNamespace(delays=delays))
     neutral = AdjustingObserver._neutral.fget(observer)  # type: ignore[attr-defined]
     assert AdjustingObserver._perceived_magnitude(observer, 0.4, neutral) == 0.4
@@ -167,9 +167,9 @@ def test_without_noise_an_observer_senses_what_is_presented(delays: bool) -> Non
 
 def test_a_hand_reaches_after_a_reaction_and_again_if_it_rests_outside_the_target() -> None:
     """With this draw the reaction takes 0.275 s, and the aim errs by nothing; then by 1.5 mm along each axis."""
-    drawn, reached = [0.5], list[tuple[float, tuple[float, ...]]]()
+    draws, reached = [0.5], list[tuple[float, tuple[float, ...]]]()
     device = SimpleNamespace(moving=False, reach_to=lambda *place_m: reached.append((now_s, place_m)))
-    hand = observers.Reacher(REACH, cast(Any, device), lambda: drawn[0], 0.0)
+    hand = observers.Reacher(REACH, cast(Any, device), lambda: draws[0], 0.0)
     left, right = REACH.targets_m
     near = (left[0], 0.005, 0.0)
     for now_s, lit, place_m, moving in (
@@ -180,7 +180,7 @@ def test_a_hand_reaches_after_a_reaction_and_again_if_it_rests_outside_the_targe
         (4.27, 1, (0, 0, 0), True), (4.28, 1, (0, 0, 0), True),
     ):  # fmt: skip
         device.moving = moving
-        drawn[0] = 1.0 if now_s > 4.2 else 0.5
+        draws[0] = 1.0 if now_s > 4.2 else 0.5
         task = TaskView(lit=lit, reached=0, of=4, dwell=0.0, elapsed_s=now_s)
         assert hand.act(now_s, TankView(np.array(place_m, float), task, 0)) is False
     assert [(at_s, pytest.approx(place_m)) for at_s, place_m in reached] == [
@@ -192,7 +192,7 @@ def test_a_hand_reaches_after_a_reaction_and_again_if_it_rests_outside_the_targe
     ("least_s", "drawn", "leaves_s"), [(5.0, 0.0, 10.5), (5.0, 0.9, 11.4), (1.0, 0.9, 7.4), (10.0, 0.5, 17.0)]
 )
 def test_an_exploration_is_left_a_little_after_its_least_time(least_s: float, drawn: float, leaves_s: float) -> None:
-    """A tenth to three tenths of the least time later, or of 5 s if that is longer; it began at 5 s."""
+    """It is left after an extra tenth to three tenths of the minimum time, or of 5 s if longer; it began at 5 s."""
     followed: list[Any] = []
     device = SimpleNamespace(workspace_m=(0.05, 0.03, 0.03), follow=lambda *path: followed.append(path))
     task = Explore(kind="explore", min_s=least_s, max_s=20, instruction="-")

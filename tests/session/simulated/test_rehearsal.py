@@ -59,11 +59,11 @@ def test_a_signal_within_a_write_leaves_a_journal_that_can_be_resumed(
     write, lines, sent = Journal._write, count(1), []
 
     def interrupted(self: Journal, content: bytes) -> Any:
-        done = write(self, content)
+        written_bytes = write(self, content)
         if next(lines) == 8:
             sent.append(number)
             signal.raise_signal(number)  # Python's handler runs before the journal counts the line
-        return done
+        return written_bytes
 
     monkeypatch.setattr(Journal, "_write", interrupted)
     with pytest.raises(ends_by):
@@ -118,7 +118,7 @@ def test_senses_tell_drag_from_a_push_and_half_of_each() -> None:
 
 
 def test_senses_that_were_cleared_contain_only_later_samples() -> None:
-    """The force is sent 3 ms after the model's; before, there was no force, although the model had one."""
+    """The force is sent 3 ms after that of the model; until then it is zero."""
     senses = SensedTrial(scale=10.0, period_s=0.001)
     rows = np.arange(400)
     model_n, sent_n = np.zeros((2, 400, 3))
@@ -148,14 +148,14 @@ def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
         senses.see(
             painted_ns, TankView(np.zeros(3), TaskView(lit=0, reached=0, of=1, dwell=0.0, elapsed_s=0.0), shown_ns)
         )
-    felt = senses.features()
-    assert felt.force_mean_n == pytest.approx(2.5)
-    assert felt.force_peak_n == pytest.approx(5)
-    assert felt.speed_rms_mps == pytest.approx(0.2)
-    assert felt.roughness_n == pytest.approx(5)
-    assert felt.delay_s == pytest.approx(0.105)
+    features = senses.features()
+    assert features.force_mean_n == pytest.approx(2.5)
+    assert features.force_peak_n == pytest.approx(5)
+    assert features.speed_rms_mps == pytest.approx(0.2)
+    assert features.roughness_n == pytest.approx(5)
+    assert features.delay_s == pytest.approx(0.105)
     for delays, vary, sensed in ((True, "delay_ms", 0.105), (False, "force_loss", 5.0), (False, "", 12.5)):
-        assert Comparison(delays, False, OBSERVER, vary).sensed(felt) == pytest.approx(sensed)
+        assert Comparison(delays, False, OBSERVER, vary).sensed(features) == pytest.approx(sensed)
 
 
 @pytest.mark.parametrize(
@@ -165,23 +165,23 @@ def test_a_setting_begins_with_large_steps_and_ends_after_it_was_crossed_in_smal
     start: int, steps: list[int]
 ) -> None:
     observer = AdjustingObserver(Comparison(True, False, Observer(delay_jnd_s=0.0), "delay_ms"), lambda: 0.5)
-    level, made = start, list[int]()
-    while not made or made[-1]:
-        made.append(observer.steps(0.3 + 0.01 * level, 0.3))
-        level += made[-1]
-    assert made == steps
+    level, moves = start, list[int]()
+    while not moves or moves[-1]:
+        moves.append(observer.steps(0.3 + 0.01 * level, 0.3))
+        level += moves[-1]
+    assert moves == steps
 
 
 @pytest.mark.parametrize("own", [None, np.int64(-3)])
 @pytest.mark.parametrize(("interval", "felt"), [(None, ("now",)), (1, ("now",)), (2, ("first", "now"))])
-def test_a_setting_is_adjusted_by_an_own_observer_or_from_what_is_sensed_now_and_in_its_own_trial(
+def test_a_setting_is_adjusted_by_its_observer_or_from_the_sensed_features(
     own: Any, interval: int | None, felt: tuple[str, ...]
 ) -> None:
     page: Any = SimpleNamespace(trial=7, interval=interval and SimpleNamespace(number=interval))
-    asked = list[Any]()
+    calls = list[Any]()
     session: Any = SimpleNamespace(
         _features_of={6: ("other",), 7: ("first",)},
-        _answer=lambda question: asked.append(question) or own,
+        _answer=lambda question: calls.append(question) or own,
         _comparison_of=lambda trial: SimpleNamespace(sensed=lambda features: f"{trial} {features}"),
         _reference_magnitude=lambda trial, sensed: f"{trial} reference, {sensed}",
     )
@@ -191,7 +191,7 @@ def test_a_setting_is_adjusted_by_an_own_observer_or_from_what_is_sensed_now_and
     steps: Any = RehearsedSession._next_steps
     simulated = "7 now", "7 reference, 7 now"
     assert steps(session, page, setting) == (simulated if own is None else -3)
-    assert [(question.page, question.felt) for question in asked] == [(page, felt)]
+    assert [(question.page, question.felt) for question in calls] == [(page, felt)]
     session._answer = None
     assert steps(session, page, setting) == simulated
 
@@ -201,14 +201,14 @@ def test_a_page_is_read_word_by_word_and_some_answers_are_changed_from_a_neighbo
     assert reading_s(page) == pytest.approx(1.0 + 6 * 0.12)
     item: Any = SimpleNamespace(id="thick", nearby=lambda value: value + 1)
     for draw, changes, values in ((0.0, True, [5, 4]), (0.5, True, [4]), (0.0, False, [4])):
-        chosen = answer_choices([item], {"thick": 4}, lambda draw=draw: draw, changes_mind=changes)
-        assert [(one.item, one.value, one.after_s) for one in chosen] == [
+        choices = answer_choices([item], {"thick": 4}, lambda draw=draw: draw, changes_mind=changes)
+        assert [(answer.item, answer.value, answer.after_s) for answer in choices] == [
             ("thick", value, pytest.approx(0.8 + draw * (2.6 - 0.8))) for value in values
         ]
 
 
 class Respondent(SimulatedParticipant):
-    """A participant whose page changes in the wait with number ``leaves_in``, and who keeps the posted events."""
+    """A participant who records the posted events; the page changes during wait number ``leaves_in``."""
 
     def __init__(self, leaves_in: int | None) -> None:
         study = load("demo")
@@ -258,26 +258,26 @@ def test_a_page_is_answered_question_by_question_and_confirmed_until_it_changes(
     respondent = Respondent(leaves_in)
     respondent.page = page
     respondent._fill_in(page)
-    shown, events = respondent.events[:3], respondent.events[3:]
-    assert [(event.at_s, event.item) for event in shown] == [(0, "thick"), (0, "warm"), (0, "slow")]
-    chosen = [event for event in events if isinstance(event, Chosen)]
-    assert [event.item for event in chosen] == ["thick", "warm", "slow"][:answers]
-    assert all(1 <= event.value <= 4 for event in chosen)
-    assert events[answers:] == ([Submitted(chosen[-1].at_s + 1.0)] if leaves_in is None else [])
+    first_events, events = respondent.events[:3], respondent.events[3:]
+    assert [(event.at_s, event.item) for event in first_events] == [(0, "thick"), (0, "warm"), (0, "slow")]
+    choices = [event for event in events if isinstance(event, Chosen)]
+    assert [event.item for event in choices] == ["thick", "warm", "slow"][:answers]
+    assert all(1 <= event.value <= 4 for event in choices)
+    assert events[answers:] == ([Submitted(choices[-1].at_s + 1.0)] if leaves_in is None else [])
 
 
 def test_each_participant_of_a_rehearsal_has_all_sessions_until_one_ends_early(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked, ran, said, grouped = list[Any](), list[str](), list[str](), list[Any]()
+    requests, sessions_run, messages, grouped = list[Any](), list[str](), list[str](), list[Any]()
 
     def run_to_end(label: str, context: Any, say: Any) -> Any:
         assert context == "opened"
-        ran.append(label)
+        sessions_run.append(label)
         say(f"{label} ran")
         return SimpleNamespace(lines=label)
 
-    monkeypatch.setattr(rehearsal, "open_session", lambda *words, **named: asked.append((words, named)) or "opened")
+    monkeypatch.setattr(rehearsal, "open_session", lambda *words, **named: requests.append((words, named)) or "opened")
     monkeypatch.setattr(rehearsal, "_run_to_end", run_to_end)
     monkeypatch.setattr(rehearsal, "planned_sessions", lambda _folder, _study, _participant: 3)
     early = {"P001, session 2": "aborted"}
@@ -288,37 +288,37 @@ def test_each_participant_of_a_rehearsal_has_all_sessions_until_one_ends_early(
     )  # fmt: skip
     folder = rehearsal.rehearse(
         "demo", participants=2, seed=9, device="falcon-emulated", results=tmp_path / "r", recordings=False,
-        group="young", progress=said.append, observer=OBSERVER,
+        group="young", progress=messages.append, observer=OBSERVER,
     )  # fmt: skip
     assert (folder, grouped) == (tmp_path / "r", [(tmp_path / "r", ["P001", "P002"], "young")])
     old = "P002 (group old)"
-    assert ran == ["P001", "P001, session 2", old, f"{old}, session 2", f"{old}, session 3"]
-    assert said == [
+    assert sessions_run == ["P001", "P001, session 2", old, f"{old}, session 2", f"{old}, session 3"]
+    assert messages == [
         "P001 ran\nP001, session 2 ran", f"{old} ran\n{old}, session 2 ran\n{old}, session 3 ran",
     ]  # fmt: skip
-    which = [(words[0].study.name, words[2], named.pop("session"), named.pop("group")) for words, named in asked]
+    which = [(words[0].study.name, words[2], named.pop("session"), named.pop("group")) for words, named in requests]
     assert which == [
         *(("demo", "P001", session, None) for session in (1, 2)),
         *(("demo", "P002", session, "old") for session in (1, 2, 3)),
     ]
-    given = {"seed": 9, "device": "falcon-emulated", "results": tmp_path / "r", "recordings": False}
-    assert all(named == given | {"observer": OBSERVER} for _, named in asked)
+    choices = {"seed": 9, "device": "falcon-emulated", "results": tmp_path / "r", "recordings": False}
+    assert all(named == choices | {"observer": OBSERVER} for _, named in requests)
 
 
 def test_every_frame_that_is_due_is_painted_a_little_later_and_seen() -> None:
-    """Half-way between 2 and 6 ms after each sixtieth of a second; a frame before there is a tank shows nothing."""
-    shown, seen = list[Any](), list[Any]()
+    """Frames are painted 2 to 6 ms after each sixtieth of a second; frames before the tank show no sample."""
+    painted_frames, seen_frames = list[Any](), list[Any]()
     views = {0: None, 16_666_667: "first", 33_333_334: "second", 50_000_001: "third"}
     view_of = lambda at_ns: views[at_ns] and SimpleNamespace(name=views[at_ns], sample_time_ns=at_ns - 7)  # noqa: E731
     session: Any = SimpleNamespace(
         _next_frame_ns=0, _paint=lambda: 0.5, rig=SimpleNamespace(servo=SimpleNamespace(now_ns=lambda: now_ns)),
-        _runner=SimpleNamespace(view=view_of, frame_shown=lambda *times_ns: shown.append(times_ns)),
+        _runner=SimpleNamespace(view=view_of, frame_shown=lambda *times_ns: painted_frames.append(times_ns)),
     )  # fmt: skip
-    senses: Any = SimpleNamespace(see=lambda at_ns, view: seen.append((at_ns, view.name)))
+    senses: Any = SimpleNamespace(see=lambda at_ns, view: seen_frames.append((at_ns, view.name)))
     now_ns = 40_000_000
     assert RehearsedSession.look(session, senses).name == "second"  # type: ignore[union-attr]
-    assert shown == [(16_666_667 + 4_000_000, 16_666_660), (33_333_334 + 4_000_000, 33_333_327)]
-    assert seen == [(20_666_667, "first"), (37_333_334, "second")]
+    assert painted_frames == [(16_666_667 + 4_000_000, 16_666_660), (33_333_334 + 4_000_000, 33_333_327)]
+    assert seen_frames == [(20_666_667, "first"), (37_333_334, "second")]
     assert RehearsedSession.look(session, senses) is None, "no other frame is due"
     now_ns = 50_000_001
     assert RehearsedSession.look(session, senses).name == "third"  # type: ignore[union-attr]
@@ -347,7 +347,7 @@ def test_the_folder_of_another_study_is_named_before_an_id_that_is_used_in_it(tm
         rehearsal.rehearse("demo", participants=1, seed=1, results=folder.path)
 
 
-def test_no_session_is_begun_after_a_finished_one_or_a_withdrawal(tmp_path: Path) -> None:
+def test_finished_and_withdrawn_participants_are_not_rehearsed_again(tmp_path: Path) -> None:
     study = rehearse_answers("demo", participants=2, seed=4, results=tmp_path / "demo", features=made_up("demo"))
     withdraw(study, "P002", by="AB", reason="asked for it")
     files, lines = Files(study), list[str]()
@@ -417,8 +417,8 @@ def test_a_signal_that_was_ignored_before_a_rehearsal_stays_ignored() -> None:
         signal.signal(signal.SIGTERM, before)
 
 
-def test_a_rehearsed_session_is_told_with_its_answers_its_time_and_what_is_missing() -> None:
-    """Of two forms, with 2 and 3 questions, one question was skipped."""
+def test_a_rehearsed_session_is_summarised_with_answers_time_and_missing_trials() -> None:
+    """One question of two forms with 2 and 3 questions was skipped."""
     forms = {"load": (0.25, 0.5), "end": (None, 0.75, 1.0)}
     lines = [
         event_of("session_started", t_s=0.0),
@@ -430,29 +430,32 @@ def test_a_rehearsed_session_is_told_with_its_answers_its_time_and_what_is_missi
     missing = MissingTrials(
         missing=(MissingTrial(trial=3, block="b", code="L1", broken=()),), asked=40, limits={"missing_percent": 5.0}
     )
-    ran, said = list[str](), list[str]()
-    session: Any = SimpleNamespace(run=lambda: ran.append("run"))
+    messages_of_run, messages = list[str](), list[str]()
+    session: Any = SimpleNamespace(run=lambda: messages_of_run.append("run"))
     for lost in (missing, MissingTrials(asked=40, limits={})):
         clock = SimpleNamespace(seconds=lambda: 450.0)
         store: Any = SimpleNamespace(clock=clock, missing_trials=lost, fingerprint="abcd-efgh", lines=lines)
-        rehearsal._run_to_end("P007", nullcontext((session, store)), said.append)
+        rehearsal._run_to_end("P007", nullcontext((session, store)), messages.append)
     rehearsal._run_to_end("P008", nullcontext((session, store)), None)
-    assert ran == ["run"] * 3
+    assert messages_of_run == ["run"] * 3
     assert session.signals is not None
     sentence = r"P007: 4 responses, 7\.5 min of session time simulated in 0\.\d s, fingerprint abcd-efgh"
-    assert re.fullmatch(f"{sentence}; {re.escape(str(missing))}", said[0])
-    assert re.fullmatch(sentence, said[1])
-    assert len(said) == 2
-    full, gone = "No space left on device", "Input/output error"
-    store.lines = [*lines, *(event_of("recording_lost", trial=2, attempt=1, reason=why) for why in (full, gone, full))]
-    rehearsal._run_to_end("P009", nullcontext((session, store)), said.append)
-    assert said[2].endswith(f"fingerprint abcd-efgh; 3 recordings could not be stored: {full}, {gone}")
+    assert re.fullmatch(f"{sentence}; {re.escape(str(missing))}", messages[0])
+    assert re.fullmatch(sentence, messages[1])
+    assert len(messages) == 2
+    full, disk_gone = "No space left on device", "Input/output error"
+    store.lines = [
+        *lines,
+        *(event_of("recording_lost", trial=2, attempt=1, reason=why) for why in (full, disk_gone, full)),
+    ]
+    rehearsal._run_to_end("P009", nullcontext((session, store)), messages.append)
+    assert messages[2].endswith(f"fingerprint abcd-efgh; 3 recordings could not be stored: {full}, {disk_gone}")
 
 
 @pytest.mark.slow
 @needs_servo
-def test_a_rehearsals_worker_tells_how_much_is_compiled_and_nothing_of_what_compiles_later(monkeypatch: Any) -> None:
-    said: list[float | str | Path] = []
+def test_a_rehearsal_worker_reports_only_the_compilation_before_its_start(monkeypatch: Any) -> None:
+    messages: list[float | str | Path] = []
     rehearsed: list[tuple[str, int, int]] = []
 
     def rehearse(study: str, *, participants: int, seed: int, **_given: Any) -> Path:
@@ -463,13 +466,13 @@ def test_a_rehearsals_worker_tells_how_much_is_compiled_and_nothing_of_what_comp
     compiled, later = numba.njit(lambda x: x + 1), numba.njit(lambda x: x + 2)
     monkeypatch.setattr(rehearsal, "rehearse", rehearse)
     order = RehearsalOrder("demo", participants=3, seed=7, results=Path("results"))
-    assert carry_out(order, said.append, lambda: False) == Path("results")
+    assert carry_out(order, messages.append, lambda: False) == Path("results")
     assert rehearsed == [("demo", 3, 7)]
-    shares = tuple(said)
+    shares = tuple(messages)
     later(2)
     assert shares
     assert all(isinstance(share, float) and 0 < share < 1 for share in shares)
-    assert tuple(said) == shares
+    assert tuple(messages) == shares
 
 
 @needs_servo
@@ -486,7 +489,7 @@ def test_a_servo_that_is_ended_from_outside_ends_the_rehearsal(monkeypatch: Any)
         condition_features(small.protocol(), seed=1, people=1)
 
 
-def confirmed(lines: Iterable[Any]) -> dict[tuple[int, str], int]:
+def confirmed_answers(lines: Iterable[Any]) -> dict[tuple[int, str], int]:
     """Return the answers by trial and item, those of the last attempt."""
     return {
         (line["trial"], item["item"]): item["value"]
@@ -502,15 +505,15 @@ def confirmed(lines: Iterable[Any]) -> dict[tuple[int, str], int]:
 def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int, page: int
 ) -> None:
-    """With these seeds another noise of the hand in the repeated trial gives other answers."""
+    """With these seeds, different noise of the hand in the repeated trial would change the answers."""
     whole, parted = StudyFolder(tmp_path / "whole"), StudyFolder(tmp_path / "parted")
     rehearsal.rehearse("demo", participants=1, seed=seed, results=whole.path, recordings=False)
-    kept, pages = SessionStore.append, count(1)
+    append, pages = SessionStore.append, count(1)
 
     def interrupted(self: SessionStore, event: Any, **about: Any) -> None:
         if isinstance(event, Responses) and next(pages) == page:
             raise KeyboardInterrupt
-        kept(self, event, **about)
+        append(self, event, **about)
 
     with monkeypatch.context() as patched:
         patched.setattr(SessionStore, "append", interrupted)
@@ -518,7 +521,7 @@ def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_
             rehearsal.rehearse("demo", participants=1, seed=seed, results=parted.path, recordings=False)
     rehearsal.resume_rehearsal(parted.session("P001", 1).path)
     lines = [journal.read(folder.session("P001", 1).journal) for folder in (whole, parted)]
-    answers, others = (confirmed(raw(each)) for each in lines)
+    answers, others = (confirmed_answers(raw(journal_lines)) for journal_lines in lines)
     assert answers == others
     (resumed,) = (line for line in lines[1] if isinstance(line, SessionResumed))
     assert resumed.gap_s == 0.0, "its simulated clock is ahead of the wall clock and must not go back"

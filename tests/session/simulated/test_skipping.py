@@ -23,7 +23,7 @@ from study_app.store.sessions.begin import SessionStart
 pytestmark = pytest.mark.slow
 
 
-def started(tmp_path: Path, study: Protocol, source: bytes, step: int, *, exactly: bool = True) -> Start:
+def start_at(tmp_path: Path, study: Protocol, source: bytes, step: int, *, exactly: bool = True) -> Start:
     start = SessionStart(
         "P001",
         seed=4,
@@ -37,43 +37,43 @@ def started(tmp_path: Path, study: Protocol, source: bytes, step: int, *, exactl
     study_folder, session = locate_session(
         begin_session_at_step(tmp_path / study.study.name, study, source, start, step)
     )
-    shown, key = preview(study, 4), read_key(study_folder.path)
-    assert (key.codes, key.nonce) == (shown.codes, shown.secret)
+    state, key = preview(study, 4), read_key(study_folder.path)
+    assert (key.codes, key.nonce) == (state.codes, state.secret)
     lines = journal.read(session.journal)
     assert datetime.fromisoformat(lines[-1].at) <= datetime.now().astimezone(), "what was skipped lies in the past"
-    return resume_at(shown.protocol, shown.schedule, lines, key, exactly=exactly)
+    return resume_at(state.protocol, state.schedule, lines, key, exactly=exactly)
 
 
 @pytest.mark.parametrize(("name", "step"), [("rek2024", 0), ("rek2024", 9), ("viscosityjnd", 60), ("delayjnd", 30)])
-def test_a_session_goes_on_at_any_step(tmp_path: Path, name: str, step: int) -> None:
+def test_a_session_can_begin_at_any_step(tmp_path: Path, name: str, step: int) -> None:
     source = source_bytes(name)
     study = parse(source, name)
-    found = started(tmp_path, study, source, step)
-    assert found.step == step
-    shown = preview(study, 4)
-    trial = shown.schedule.steps[step]
-    if found.heard:
+    session = start_at(tmp_path, study, source, step)
+    assert session.step == step
+    pages = preview(study, 4)
+    trial = pages.schedule.steps[step]
+    if session.heard:
         assert isinstance(trial, Trial)
-        due, first = (next_level(shown.protocol, Key(shown.codes, shown.secret), shown.schedule, trial, heard)
-                      for heard in (found.heard, ()))  # fmt: skip
+        key = Key(pages.codes, pages.secret)
+        due, first = (next_level(pages.protocol, key, pages.schedule, trial, heard) for heard in (session.heard, ()))
         assert due is not None
         assert first is not None
         assert name != "viscosityjnd" or due.level != first.level  # the track has followed the simulated answers
 
 
-def test_a_study_that_resumes_by_blocks_goes_on_within_one(tmp_path: Path) -> None:
+def test_a_study_that_resumes_by_blocks_can_begin_within_one(tmp_path: Path) -> None:
     source = source_bytes("rek2024").replace(b'resume = "trial"', b'resume = "block"')
     study = parse(source, "rek2024")
     steps = preview(study, 4).schedule.steps
     third = next(at for at, step in enumerate(steps) if isinstance(step, Trial) and step.index == 3)
-    assert started(tmp_path / "exactly", study, source, third).step == third
-    assert started(tmp_path / "by-blocks", study, source, third, exactly=False).step < third
+    assert start_at(tmp_path / "exactly", study, source, third).step == third
+    assert start_at(tmp_path / "by-blocks", study, source, third, exactly=False).step < third
 
 
 def test_levels_of_a_block_that_is_presented_again_do_not_follow_its_earlier_answers(tmp_path: Path) -> None:
     source = source_bytes("viscosityjnd").replace(b"[study]", b'[study]\nresume = "block"', 1)
     study = parse(source, "viscosityjnd")
-    exactly, again = (started(tmp_path / f"{how}", study, source, 60, exactly=how) for how in (True, False))
+    exactly, again = (start_at(tmp_path / f"{how}", study, source, 60, exactly=how) for how in (True, False))
     first = preview(study, 4).schedule.steps[again.step]
     assert isinstance(first, Trial)
     assert first.index == 1
@@ -91,4 +91,4 @@ def test_a_step_behind_a_criterion_that_is_missed_is_not_reached(tmp_path: Path)
         source = source.replace(old, new)
     study = parse(source, "viscosityjnd")
     with pytest.raises(SessionError, match="criterion"):
-        started(tmp_path, study, source, 60)
+        start_at(tmp_path, study, source, 60)

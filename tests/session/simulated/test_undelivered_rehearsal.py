@@ -59,11 +59,11 @@ def rows_of(session: Path, table: str) -> list[dict[str, str]]:
 
 
 def by_trial(lines: list[dict[str, Any]], event: str) -> dict[int, list[dict[str, Any]]]:
-    found: dict[int, list[dict[str, Any]]] = {}
+    lines_of_trial: dict[int, list[dict[str, Any]]] = {}
     for line in lines:
         if line["event"] == event:
-            found.setdefault(line["trial"], []).append(line)
-    return found
+            lines_of_trial.setdefault(line["trial"], []).append(line)
+    return lines_of_trial
 
 
 def outcomes(lines: list[dict[str, Any]]) -> list[tuple[int, int, str]]:
@@ -74,20 +74,20 @@ def answers(lines: list[dict[str, Any]]) -> list[tuple[int, Any]]:
     return [(line["trial"], line["items"][0]["value"]) for line in lines if line["event"] == "responses"]
 
 
-def test_clipped_intervals_are_invalid_and_their_trials_come_again_and_are_not_asked_about(session: Path) -> None:
+def test_trials_with_clipped_intervals_are_repeated_without_a_question(session: Path) -> None:
     lines = lines_of(session)
-    started, ended = by_trial(lines, "trial_started"), by_trial(lines, "trial_ended")
+    start_lines, ended = by_trial(lines, "trial_started"), by_trial(lines, "trial_ended")
     answered = set(by_trial(lines, "responses"))
-    strong = {trial for trial, attempts in started.items() if attempts[0]["level"] == STRONG}
+    strong = {trial for trial, attempts in start_lines.items() if attempts[0]["level"] == STRONG}
     assert len(strong) == 2
-    assert answered == set(started) - strong
+    assert answered == set(start_lines) - strong
     for trial in strong:
         assert [line["outcome"] for line in ended[trial]] == ["invalid"] * ATTEMPTS
-        assert len({(line["level"], line["standard"], line["arrangement"]) for line in started[trial]}) == 1
+        assert len({(line["level"], line["standard"], line["arrangement"]) for line in start_lines[trial]}) == 1
     invalid = [line for line in lines if line["event"] == "interval_ended" and "invalid" in line]
     assert len(invalid) == ATTEMPTS * len(strong)
     for line in invalid:
-        arrangement = started[line["trial"]][0]["arrangement"]
+        arrangement = start_lines[line["trial"]][0]["arrangement"]
         assert arrangement[line["interval"] - 1] == "C"
         assert line["invalid"] == ["level_error_percent", "force_limit_n"]
         assert line["limiter_norm"] > 0
@@ -107,16 +107,19 @@ def test_tables_say_invalid_and_why_without_a_number(session: Path) -> None:
 def test_journal_recordings_and_answers_agree(study: Path) -> None:
     session = StudyFolder(study).sessions()[0].path
     assert replay(session).proved
-    found = reproduce_session(session)
-    assert (found.differences, found.followed) == ([], ["thicker: 4 of 4 levels are consistent with the answers"])
+    reproduction = reproduce_session(session)
+    assert (reproduction.differences, reproduction.followed) == (
+        [],
+        ["thicker: 4 of 4 levels are consistent with the answers"],
+    )
     checked = verify_study(study, None)
     lost = (
         "2 of 4 trials were not delivered: the force was not as requested (limit 5 %) in 2, the force limit was reached"
     )
-    assert (checked.errors, [one.message for one in checked.warnings]) == ((), [f"{lost} in 2"])
+    assert (checked.errors, [warning.message for warning in checked.warnings]) == ((), [f"{lost} in 2"])
 
 
-def test_a_session_ended_between_two_attempts_goes_on_to_the_same_answers(session: Path, protocol: Path) -> None:
+def test_a_session_ended_between_two_attempts_continues_to_the_same_answers(session: Path, protocol: Path) -> None:
     whole = lines_of(session)
     invalid = [index for index, line in enumerate(whole) if line.get("outcome") == "invalid"]
     content = (session / "journal.jsonl").read_bytes()
@@ -148,8 +151,12 @@ def test_check_notes_levels_of_a_liquid_with_inertia_that_a_rehearsal_does_not_d
 ) -> None:
     file = tmp_path / "inertia.toml"
     file.write_text(INERTIA.format(scale=scale, vary=goo[0], liquid=goo[1]), encoding="utf-8", newline="\n")
-    said = " ".join(CliRunner().invoke(commands, ["check", str(file)]).output.split())
-    assert said.count("levels 0.6 and 0.02 cannot be rendered if the hand") == said.count("cannot be rendered") == notes
+    message = " ".join(CliRunner().invoke(commands, ["check", str(file)]).output.split())
+    assert (
+        message.count("levels 0.6 and 0.02 cannot be rendered if the hand")
+        == message.count("cannot be rendered")
+        == notes
+    )
     study = rehearse(file, participants=1, seed=1, results=tmp_path / "results")
     valid = {row["valid"] for row in rows_of(StudyFolder(study).sessions()[0].path, "trials")}
     assert valid == {"false" if notes else "true"}

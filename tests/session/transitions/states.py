@@ -35,7 +35,7 @@ LEFT = Write(line_of("choice", trial=2, item="liquid", value=5), waits=True)
 
 @cache
 def state_in(phase: Phase) -> SessionState:
-    """Return a session in that phase, in its first main trial where there is one."""
+    """Return a session in that phase, in its first main trial if the phase has one."""
     if phase is Phase.OPENING:
         return small.opened()
     if phase is Phase.COMPLETE:
@@ -65,7 +65,7 @@ def state_in(phase: Phase) -> SessionState:
 
 
 def event_of(kind: type[Any]) -> Any:
-    """Return an event of that kind that says nothing impossible."""
+    """Return a valid event of that kind."""
     more: dict[type[Any], tuple[Any, ...]] = {
         TaskDone: ("complete", {"duration_s": 2.0}),
         Stepped: (1,),

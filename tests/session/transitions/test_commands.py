@@ -51,25 +51,25 @@ def second_interval() -> SessionState:
 
 
 @pytest.mark.slow
-def test_only_what_a_person_gave_waits_for_the_disk() -> None:
+def test_only_input_of_a_person_waits_for_the_disk() -> None:
     cases: list[tuple[SessionState, Event]] = [
         (last_page(), Continue(90.0)),
         (state_in(Phase.TASK), Note(9.0, "mark", "")),
         *((state_in(phase), event_of(kind)) for phase, kind in product(Phase, EVENTS)),
     ]
-    written: dict[bool, set[tuple[str, str | None]]] = {True: set(), False: set()}
+    events_by_wait: dict[bool, set[tuple[str, str | None]]] = {True: set(), False: set()}
     for state, event in cases:
         with suppress(SessionError):
             for command in advance(state, event)[1]:
                 if isinstance(command, Write) and command is not LEFT:
                     fields = command.line.fields()
-                    written[command.waits].add((command.line.event, fields.get("page", fields.get("kind"))))
-    assert written[True] == {
+                    events_by_wait[command.waits].add((command.line.event, fields.get("page", fields.get("kind"))))
+    assert events_by_wait[True] == {
         ("page_left", "welcome"), ("choice", "statement"), ("answer_removed", None), ("responses", None),
         ("note", "note"), ("repeat", None), ("device_reconnected", None),
     }  # fmt: skip
-    assert written[True].isdisjoint(written[False])
-    assert written[False] >= {("page_left", "thanks"), ("note", "mark")}
+    assert events_by_wait[True].isdisjoint(events_by_wait[False])
+    assert events_by_wait[False] >= {("page_left", "thanks"), ("note", "mark")}
 
 
 INTERRUPTIONS: tuple[Event, ...] = (
@@ -82,8 +82,8 @@ INTERRUPTIONS: tuple[Event, ...] = (
 
 
 @pytest.mark.parametrize("event", INTERRUPTIONS, ids=lambda event: type(event).__name__)
-def test_an_interrupted_attempt_has_the_measures_of_what_ran(event: Event) -> None:
-    """A trial of intervals has none of its own, and in a rest nothing ran."""
+def test_an_interrupted_attempt_has_the_measures_of_its_running_part(event: Event) -> None:
+    """A trial of intervals has no measures itself, and a rest has no running part."""
     for state, expected in (
         (state_in(Phase.TASK), [("trial_ended", None, True)]),
         (second_interval(), [("interval_ended", 2, True), ("trial_ended", None, False)]),
@@ -95,8 +95,8 @@ def test_an_interrupted_attempt_has_the_measures_of_what_ran(event: Event) -> No
             for command in advance(state, event)[1]
             if isinstance(command, Write) and command.line.event.endswith("_ended")
         ]
-        told = [(end.line.event, end.line.fields().get("interval"), end.measured) for end in ends]
-        assert told == expected
+        measures = [(end.line.event, end.line.fields().get("interval"), end.measured) for end in ends]
+        assert measures == expected
         for end in ends:
             fields = end.line.fields()
             assert (fields["outcome"], fields["trial"], fields["attempt"]) == (
@@ -118,7 +118,7 @@ def test_measures_are_those_of_the_interval_and_of_a_trial_without_intervals() -
     assert (after.phase, after.answers) == (Phase.ANSWERING, {})
 
 
-def test_an_undelivered_trial_comes_again_after_the_force_has_faded_and_a_rest() -> None:
+def test_an_undelivered_trial_is_repeated_after_a_fade_and_a_rest() -> None:
     state = to_trial(pairs.opened(), "viscosity", 2)
     again, commands = advance(state, TaskDone(100.0, "complete", {}, ("pace_error_percent",)))
     assert dict(lines_of(commands))["interval_ended"]["invalid"] == ("pace_error_percent",)
@@ -135,9 +135,12 @@ def test_a_setting_is_answered_by_the_sum_of_its_steps_and_has_the_level_that_wa
     assert values[1:3] == [18.0, 2.0]  # the ends of the range
     assert 2.0 < (values[3] or 0.0) < 18.0
     _, commands = advance(state, TaskDone(30.0, "complete", {"duration_s": 20.0}))
-    told = dict(lines_of(commands))
-    assert (told["interval_ended"]["setting"], told["interval_ended"]["duration_s"]) == (values[3], 20.0)
-    assert told["choice"]["value"] == told["responses"]["items"][0]["value"] == -1 + 1000 - 5000 + 2
+    lines_by_event = dict(lines_of(commands))
+    assert (lines_by_event["interval_ended"]["setting"], lines_by_event["interval_ended"]["duration_s"]) == (
+        values[3],
+        20.0,
+    )
+    assert lines_by_event["choice"]["value"] == lines_by_event["responses"]["items"][0]["value"] == -1 + 1000 - 5000 + 2
 
 
 def test_only_the_first_estimation_states_the_number_of_its_modulus() -> None:

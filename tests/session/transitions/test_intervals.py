@@ -22,16 +22,16 @@ from tests.session.transitions.transcribed import opened, to_trial
 DONE = TaskDone(10.0, "complete", {})
 
 
-def test_a_presented_level_is_in_no_printed_command_or_state() -> None:
+def test_printed_commands_and_states_do_not_contain_the_presented_level() -> None:
     state = to_trial(pairs.opened(), "viscosity", 2)
     assert state.due is not None
     again, commands = advance(advance(state, DONE)[0], TimeUp(20.0))
-    values = [f"{one.value:.6g}"[:6] for one in state.due.intervals if one.value not in (1.0, 2.0)]
+    values = [f"{interval.value:.6g}"[:6] for interval in state.due.intervals if interval.value not in (1.0, 2.0)]
     assert values
-    assert not [one for one in values if one in f"{commands} {state} {again}"]
+    assert not [value for value in values if value in f"{commands} {state} {again}"]
 
 
-def test_practice_ends_with_its_criterion_and_what_is_left_is_passed_over_with_its_breaks() -> None:
+def test_practice_ends_at_its_criterion_and_skips_the_remaining_trials_and_breaks() -> None:
     lines = pairs.whole(pairs.opened())
     passed = [line for line in lines if line["event"] == "passed_over"]
     assert {line["reason"] for line in passed} == {"criterion_met"}
@@ -49,14 +49,14 @@ def test_a_break_is_skipped_only_where_nothing_was_presented_since_the_page_befo
 
 
 @pytest.mark.parametrize(("missed", "status"), [("go_on", "completed"), ("end", "aborted")])
-def test_a_missed_criterion_goes_on_or_ends_the_session(missed: str, status: str) -> None:
+def test_a_missed_criterion_continues_or_ends_the_session(missed: str, status: str) -> None:
     more = pairs.PRACTICE.replace("of = 3 }", f'of = 3, missed = "{missed}" }}')
     state = pairs.opened(pairs.protocol(more=more))
     state = pairs.walk(state, Phase.ANSWERING, times=6, right=False)
     assert state.trial.index == 6
     while state.phase not in {Phase.ENDED, Phase.TASK}:
         state, commands = advance(state, pairs.next_event(state, state.since_s, right=False))
-    finish = next((one for one in commands if isinstance(one, Finish)), None)
+    finish = next((command for command in commands if isinstance(command, Finish)), None)
     assert (finish.status if finish else "completed") == status
     assert finish is None or "training" in finish.reason
 
@@ -66,7 +66,7 @@ def test_a_study_with_levels_needs_the_keys_secret() -> None:
         pairs.opened(secret=b"")
 
 
-def test_no_feedback_is_shown_where_a_level_is_a_value_so_that_no_answer_is_correct() -> None:
+def test_feedback_is_not_shown_if_no_answer_is_correct() -> None:
     edits = (
         ("levels = [0.1, 0.8]", 'levels = [0.1, 0.8]\nlevel = "value"'),
         ("standards = [1, 2]\n", ""),
@@ -86,7 +86,7 @@ NO_SEALS: Any = object()
 """A key, where nothing is sealed."""
 
 
-def done(at_s: float, *invalid: str, **measured: Any) -> TaskDone:
+def task_done(at_s: float, *invalid: str, **measured: Any) -> TaskDone:
     return TaskDone(at_s, "complete", measured, invalid)
 
 
@@ -109,15 +109,15 @@ def events_of(state: SessionState, fails: frozenset[tuple[int, int]]) -> Iterato
     while state.phase not in FINAL:
         event = pairs.next_event(state, at_s)
         if isinstance(event, TaskDone) and (state.trial.number, state.invalid) in fails:
-            event = done(at_s, "level_error_percent")
+            event = task_done(at_s, "level_error_percent")
         state, commands = advance(state, event)
-        for one in commands:
-            if isinstance(one, Write):
-                yield state, {"event": one.line.event, "t_s": at_s, **one.line.fields()}
+        for command in commands:
+            if isinstance(command, Write):
+                yield state, {"event": command.line.event, "t_s": at_s, **command.line.fields()}
         at_s += 100.0
 
 
-def test_undelivered_attempts_before_an_interruption_count_for_the_interrupted_trial_alone() -> None:
+def test_undelivered_attempts_count_only_for_the_interrupted_trial() -> None:
     steps = pairs.opened().plan.schedule.steps
     index = next(number for number, step in enumerate(steps) if getattr(step, "block", "") == "viscosity")
     start = Start(index, presented={steps[index].number: 2}, invalid=2)
@@ -152,13 +152,13 @@ def test_a_session_killed_after_any_line_gives_up_the_same_trials_as_one_that_wa
         resumed = [line for _, line in events_of(state, FAILS)]
         assert answers([*lines[:count], *resumed]) == whole, lines[count - 1]
         assert undelivered([*lines[:count], *resumed]) == invalid, lines[count - 1]
-        assert presented([*resumed, *lines]) == presented(lines), lines[count - 1]
+        assert presented_levels([*resumed, *lines]) == presented_levels(lines), lines[count - 1]
 
 
-def presented(lines: list[dict[str, Any]]) -> set[tuple[int, float, str]]:
-    """Return the level and the arrangement of each trial: one for all its attempts."""
-    started = [line for line in lines if line["event"] == "trial_started"]
-    return {(line["trial"], line["level"], line["arrangement"]) for line in started}
+def presented_levels(lines: list[dict[str, Any]]) -> set[tuple[int, float, str]]:
+    """Return the level and the arrangement of each trial, which all its attempts share."""
+    start_lines = [line for line in lines if line["event"] == "trial_started"]
+    return {(line["trial"], line["level"], line["arrangement"]) for line in start_lines}
 
 
 def undelivered(lines: list[dict[str, Any]]) -> Counter[int]:
@@ -167,12 +167,12 @@ def undelivered(lines: list[dict[str, Any]]) -> Counter[int]:
 
 
 def answers(lines: list[dict[str, Any]]) -> dict[int, list[Any]]:
-    """Return what was answered, by trial."""
-    found = {}
+    """Return the answers by trial."""
+    answers_found = {}
     for line in lines:
         if line["event"] == "responses":
-            found[line["trial"]] = [item["value"] for item in line["items"]]
-    return found
+            answers_found[line["trial"]] = [item["value"] for item in line["items"]]
+    return answers_found
 
 
 def test_intervals_rests_and_feedback_last_as_long_as_the_design_says() -> None:

@@ -26,7 +26,7 @@ def in_language(state: SessionState, language: str) -> SessionState:
     [
         (
             "en",
-            ("One moment, please", "The force is off and your answers are saved. The operator will help; "
+            ("One moment, please", "The force is off and your answers are saved. The researcher will help; "
              "you do not need to do anything."),
             ("Thank you", "The session is complete."),
             ("The session has ended", "Thank you for your time."),
@@ -35,7 +35,7 @@ def in_language(state: SessionState, language: str) -> SessionState:
             "nl",
             ("Een ogenblik geduld", "De kracht is uit en uw antwoorden zijn bewaard. De onderzoeker helpt; "
              "u hoeft niets te doen."),
-            ("Dank u wel", "De sessie is klaar."),
+            ("Dank u wel", "De sessie is afgerond."),
             ("De sessie is beëindigd", "Dank u voor uw tijd."),
         ),
     ],
@@ -130,7 +130,7 @@ def test_trials_and_breaks_of_a_block_with_a_criterion_say_at_most() -> None:
     assert main[0] == Progress(part=1, parts=1, label="Pair 1", index=1, of=12, at_most=False)
 
 
-def test_a_rating_after_intervals_has_no_introduction_and_a_modulus_has_the_decimal_sign_of_the_language() -> None:
+def test_a_rating_page_lacks_the_introduction_and_a_modulus_uses_the_languages_decimal_sign() -> None:
     rating = pairs.walk(replying("strength", *VALUE), Phase.ANSWERING)
     assert build_page(rating).intro == ""  # type: ignore[union-attr]
     assert rating.questionnaire.intro

@@ -65,11 +65,11 @@ INCIDENTS = st.one_of(ANY_EVENT, st.sampled_from([event_of(Broke), event_of(EndR
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.one_of(st.none(), st.none(), ANY_EVENT), max_size=120), st.lists(INCIDENTS, max_size=5))
 @pytest.mark.slow
-def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events: list[Any], late: list[Any]) -> None:
-    """None stands for going on as if nothing had happened."""
+def test_answers_survive_any_events_and_the_session_can_be_ended(events: list[Any], late: list[Any]) -> None:
+    """None stands for continuing without an incident."""
     state = small.opened()
     latest: dict[tuple[int, int], dict[str, Any]] = {}
-    kept: dict[int, dict[str, Any]] = {}
+    answers_kept: dict[int, dict[str, Any]] = {}
     disk: list[Any] = []
     for drawn in [*events, *late]:
         event = _going_on(state) if drawn is None else drawn
@@ -86,12 +86,14 @@ def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events:
         if isinstance(event, Retracted):
             latest.setdefault((before.trial.number, before.attempt), {}).pop(event.item, None)
         if isinstance(event, Submitted) and before.phase is Phase.ANSWERING:
-            kept[before.trial.number] = latest[before.trial.number, before.attempt]
+            answers_kept[before.trial.number] = latest[before.trial.number, before.attempt]
         state = after
     confirmed = {write.line.trial: write.line.items for write in disk if write.line.event == "responses"}
-    assert {trial: {row.item: row.value for row in rows if row.given} for trial, rows in confirmed.items()} == kept
-    chosen = [write for write in disk if write.line.event == "choice"]
-    assert len(chosen) >= sum(len(answers) for answers in kept.values())
+    assert {
+        trial: {row.item: row.value for row in rows if row.given} for trial, rows in confirmed.items()
+    } == answers_kept
+    choices = [write for write in disk if write.line.event == "choice"]
+    assert len(choices) >= sum(len(answers) for answers in answers_kept.values())
     if state.phase is Phase.STALLED:
         state, _ = advance(state, WriteCompleted(998.0))
     if state.phase not in FINAL:
@@ -108,7 +110,7 @@ def _going_on(state: SessionState) -> Any:
 
 
 def _check_order(commands: tuple[Any, ...]) -> None:
-    """Safety of the hand, then the disk, then what is felt and seen; nothing after the page."""
+    """Check the order of commands: force, then disk, then scenes and windows, and the page last."""
     rank = {StopForce: 0, StopTrial: 0, Rest: 0, Write: 1, WriteTables: 1, FadeIn: 1, Finish: 1, StartTrial: 2}
     ranks = [rank.get(type(command), 3) for command in commands]
     assert ranks == sorted(ranks)
@@ -120,7 +122,7 @@ def _check_order(commands: tuple[Any, ...]) -> None:
 @settings(max_examples=30, deadline=None)
 def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: st.DataObject) -> None:
     state = small.opened(seed)
-    begun: list[tuple[int, int]] = []
+    open_trials: list[tuple[int, int]] = []
     ended: list[tuple[int, int]] = []
     while state.phase not in FINAL:
         if state.phase is Phase.PAUSED:
@@ -135,11 +137,11 @@ def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: s
         for command in commands:
             if isinstance(command, Write) and command.line.event in {"trial_started", "trial_ended"}:
                 which = (command.line.trial, command.line.attempt)
-                (begun if command.line.event == "trial_started" else ended).append(which)
-    assert begun == ended
-    assert len(set(begun)) == len(begun)
+                (open_trials if command.line.event == "trial_started" else ended).append(which)
+    assert open_trials == ended
+    assert len(set(open_trials)) == len(open_trials)
     steps = state.plan.schedule.steps
-    assert {trial for trial, _ in begun} == {step.number for step in steps if isinstance(step, Trial)}
+    assert {trial for trial, _ in open_trials} == {step.number for step in steps if isinstance(step, Trial)}
 
 
 def test_the_page_that_an_event_shows_is_that_of_the_state_after_it() -> None:
@@ -158,15 +160,15 @@ def test_the_page_that_an_event_shows_is_that_of_the_state_after_it() -> None:
 def pages_of_session(shown: Any, language: str) -> list[Any]:
     """Return every page of a session, each once."""
     plan = (shown.protocol, shown.schedule, shown.codes, language, FIRST, shown.secret)
-    state, found, at_s = initial_state(*plan), [], 0.0
+    state, pages, at_s = initial_state(*plan), [], 0.0
     event: Any = Begin(at_s)
     while True:
         state, commands = advance(state, event)
-        found += [command.page for command in commands if isinstance(command, ShowPage)]
+        pages += [command.page for command in commands if isinstance(command, ShowPage)]
         at_s += 1000.0
-        page = found[-1]
+        page = pages[-1]
         if isinstance(page, EndPage):
-            return found[:-1]
+            return pages[:-1]
         if state.phase is Phase.READING:
             event = Continue(at_s)
         elif state.phase is Phase.TASK:
@@ -178,7 +180,7 @@ def pages_of_session(shown: Any, language: str) -> list[Any]:
                 value = question.view(1, state.context).simulated(5.0, lambda: 0.5)
                 state, _ = advance(state, ItemShown(at_s, question.id))
                 state, commands = advance(state, Chosen(at_s, question.id, value))
-                found += [command.page for command in commands if isinstance(command, ShowPage)]
+                pages += [command.page for command in commands if isinstance(command, ShowPage)]
             event = Submitted(at_s)
             if state.phase is not Phase.ANSWERING:
                 event = TimeUp(at_s) if state.phase in {Phase.RESTING, Phase.FEEDBACK} else event
@@ -227,19 +229,22 @@ def plain(page: Any) -> Any:
 @pytest.mark.parametrize("name", ["demo", "rek2024"])
 @pytest.mark.parametrize("language", ["en", "nl"])
 def test_every_page_of_a_preview_is_that_of_a_session_with_its_seed(name: str, language: str) -> None:
-    shown = preview(load(name))
-    if language not in shown.protocol.study.languages:
+    previewed_session = preview(load(name))
+    if language not in previewed_session.protocol.study.languages:
         pytest.skip("not in this language")
     previewed = [
-        previewed_page(shown, index, moment, language)
-        for index in range(len(shown.schedule.steps))
-        for moment in pages_of_step(shown, index)
+        previewed_page(previewed_session, index, moment, language)
+        for index in range(len(previewed_session.schedule.steps))
+        for moment in pages_of_step(previewed_session, index)
     ]
-    held = pages_of_session(shown, language)
-    assert {type(page) for page in held} == {TextPage, TaskPage, QuestionnairePage}
-    assert [plain(page) for page in previewed] == [plain(page) for page in held]
-    intros = {shown.protocol.text(form.intro, language) for form in shown.protocol.questionnaires.values()}
-    forms = [page for page in held if isinstance(page, QuestionnairePage)]
+    session_pages = pages_of_session(previewed_session, language)
+    assert {type(page) for page in session_pages} == {TextPage, TaskPage, QuestionnairePage}
+    assert [plain(page) for page in previewed] == [plain(page) for page in session_pages]
+    intros = {
+        previewed_session.protocol.text(form.intro, language)
+        for form in previewed_session.protocol.questionnaires.values()
+    }
+    forms = [page for page in session_pages if isinstance(page, QuestionnairePage)]
     assert {page.intro for page in forms} <= intros
     assert all([item.number for item in page.items] == [*range(1, len(page.items) + 1)] for page in forms)
 
@@ -252,14 +257,14 @@ def test_each_time_a_form_is_asked_its_simulated_answers_have_a_stream_of_their_
 
 @pytest.mark.parametrize("name", ["viscosityjnd", "compared"])
 def test_a_trial_of_intervals_has_a_page_for_each_its_question_and_its_feedback(name: str) -> None:
-    shown = preview(parse(text_of(name).encode(), "study.toml"))
-    blocks = shown.protocol.blocks
-    index, trial = next((at, one) for at, one in enumerate(shown.schedule.steps)
-                        if getattr(one, "block", "") and blocks[one.block].design is not None)  # fmt: skip
-    found = pages_of_step(shown, index)
-    count = shown.protocol.design_of(blocks[trial.block]).intervals
-    assert found[: count + 1] == (*(Moment("tank", number) for number in range(1, count + 1)), Moment("questions"))
-    pages = [previewed_page(shown, index, moment, "en") for moment in found]
+    previewed_session = preview(parse(text_of(name).encode(), "study.toml"))
+    blocks = previewed_session.protocol.blocks
+    index, trial = next((at, step) for at, step in enumerate(previewed_session.schedule.steps)
+                        if getattr(step, "block", "") and blocks[step.block].design is not None)  # fmt: skip
+    step_pages = pages_of_step(previewed_session, index)
+    count = previewed_session.protocol.design_of(blocks[trial.block]).intervals
+    assert step_pages[: count + 1] == (*(Moment("tank", number) for number in range(1, count + 1)), Moment("questions"))
+    pages = [previewed_page(previewed_session, index, moment, "en") for moment in step_pages]
     assert [(page.interval.number, page.interval.of) for page in pages[:count]] == [
         (number, count) for number in range(1, count + 1)
     ]
@@ -272,26 +277,28 @@ def test_a_trial_of_intervals_has_a_page_for_each_its_question_and_its_feedback(
     [("forcedelay", {"practice", "main"}), ("delaydetect", {"practice"}), ("thickness", set()), ("matching", set())],
 )
 def test_feedback_follows_the_question_of_the_phases_that_have_it(name: str, has_feedback: set[str]) -> None:
-    shown, phases = preview(parse(text_of(name).encode(), "study.toml")), set()
-    for index, step in enumerate(shown.schedule.steps):
-        if isinstance(step, Trial) and shown.protocol.blocks[step.block].design is not None:
-            kinds = [moment.kind for moment in pages_of_step(shown, index) if moment.kind != "tank"]
-            asked = [] if name == "matching" else ["questions"]
-            assert kinds == asked + ["feedback"] * (step.phase in has_feedback), step
-            tanks = [moment for moment in pages_of_step(shown, index) if moment.kind == "tank"]
+    previewed_session, phases = preview(parse(text_of(name).encode(), "study.toml")), set()
+    for index, step in enumerate(previewed_session.schedule.steps):
+        if isinstance(step, Trial) and previewed_session.protocol.blocks[step.block].design is not None:
+            kinds = [moment.kind for moment in pages_of_step(previewed_session, index) if moment.kind != "tank"]
+            expected_pages = [] if name == "matching" else ["questions"]
+            assert kinds == expected_pages + ["feedback"] * (step.phase in has_feedback), step
+            tanks = [moment for moment in pages_of_step(previewed_session, index) if moment.kind == "tank"]
             for moment in tanks:
-                page = previewed_page(shown, index, moment, "en")
+                page = previewed_page(previewed_session, index, moment, "en")
                 assert page.adjusts == (name == "matching" and moment == tanks[-1])
                 assert page.said == (page.question if page.adjusts else page.instruction) != ""
             phases.add(step.phase)
     assert phases >= has_feedback
 
 
-def test_answers_that_a_question_no_longer_accepts_are_left_out() -> None:
-    shown = preview(load("demo"))
-    index = next(at for at, step in enumerate(shown.schedule.steps) if getattr(step, "block", "") == "liquids")
+def test_answers_that_a_question_no_longer_accepts_are_omitted() -> None:
+    previewed_session = preview(load("demo"))
+    index = next(
+        at for at, step in enumerate(previewed_session.schedule.steps) if getattr(step, "block", "") == "liquids"
+    )
     answers = {"feels_liquid": 6, "like_honey": 99, "removed": 3}
-    page = previewed_page(shown, index, Moment("questions"), "en", answers)
+    page = previewed_page(previewed_session, index, Moment("questions"), "en", answers)
     assert page.chosen == (("feels_liquid", 6),)
 
 
@@ -300,14 +307,16 @@ def test_answers_have_the_numbers_of_their_questions_although_some_are_hidden(ha
     study = parse(text_of("mixed").encode(), "mixed.toml")
     key = draw_key(study, stream(1, "key").random)
     state, _ = advance(initial_state(study, build_schedule(study, "P001", 1), key, "en"), Begin(0.0))
-    given = {"age": 31, "hand": hand, "since": 7, "used": ["mouse"]}
-    assert state.items == tuple(given)
-    answers = {item: Answer(onset_s=0.0, first_s=1.0, last_s=2.0, value=value) for item, value in given.items()}
+    answers_given = {"age": 31, "hand": hand, "since": 7, "used": ["mouse"]}
+    assert state.items == tuple(answers_given)
+    answers = {item: Answer(onset_s=0.0, first_s=1.0, last_s=2.0, value=value) for item, value in answers_given.items()}
     _, commands = advance(replace(state, answers=answers), Submitted(3.0))
-    (line,) = (each.line for each in commands if isinstance(each, Write) and each.line.event == "form_answered")
+    (line,) = (
+        command.line for command in commands if isinstance(command, Write) and command.line.event == "form_answered"
+    )
     assert line.form == "start"
     assert [(item.number, item.item, item.value) for item in line.items] == [
-        (number, item, value) for number, (item, value) in enumerate(given.items(), 1) if number in numbers
+        (number, item, value) for number, (item, value) in enumerate(answers_given.items(), 1) if number in numbers
     ]
 
 
@@ -315,9 +324,11 @@ def test_only_answers_to_questions_that_are_hidden_now_are_removed() -> None:
     study = parse(text_of("mixed").encode(), "mixed.toml")
     key = draw_key(study, stream(1, "key").random)
     state, _ = advance(initial_state(study, build_schedule(study, "P001", 1), key, "en"), Begin(0.0))
-    given = {"age": 31, "hand": "both", "since": 7, "used": ["mouse"]}
-    answers = {item: Answer(onset_s=0.0, first_s=1.0, last_s=2.0, value=value) for item, value in given.items()}
+    answers_given = {"age": 31, "hand": "both", "since": 7, "used": ["mouse"]}
+    answers = {item: Answer(onset_s=0.0, first_s=1.0, last_s=2.0, value=value) for item, value in answers_given.items()}
     state, commands = advance(replace(state, answers=answers), Chosen(3.0, "hand", "left"))
     assert [item for item, answer in state.answers.items() if answer.given] == ["age", "hand", "used"]
-    removed = [each.line for each in commands if isinstance(each, Write) and each.line.event == "answer_removed"]
+    removed = [
+        command.line for command in commands if isinstance(command, Write) and command.line.event == "answer_removed"
+    ]
     assert [line.item for line in removed] == ["since"]

@@ -42,12 +42,12 @@ STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FE
 
 
 @pytest.mark.parametrize("file", every(FOLDER, "intervals reading settings table"), ids=lambda file: file.stem)
-def test_events_command_what_they_did(file: Path, pytestconfig: pytest.Config) -> None:
+def test_events_cause_the_recorded_commands(file: Path, pytestconfig: pytest.Config) -> None:
     compare(file, played(file, play), pytestconfig)
 
 
 @pytest.mark.parametrize("phase", [phase for phase in Phase if phase is not Phase.STALLED])
-def test_a_disk_that_takes_nothing_stops_the_force_and_keeps_what_is_left_from_every_phase(phase: Phase) -> None:
+def test_a_full_disk_stops_the_force_and_keeps_pending_writes_in_every_phase(phase: Phase) -> None:
     before = state_in(phase)
     stalled, commands = advance(before, WriteFailed(9.0, "disk full", (LEFT,)))
     assert commands[:3] == (StopForce(), StopTrial(), Rest())
@@ -72,7 +72,7 @@ def test_a_disk_that_takes_nothing_stops_the_force_and_keeps_what_is_left_from_e
         ("operator", "program", "the operator paused the session"),
     ],
 )
-def test_who_may_resume_after_a_pause_and_a_stop(paused_by: Any, stopped_by: Any, refusal: str) -> None:
+def test_resuming_requires_whoever_paused_or_stopped(paused_by: Any, stopped_by: Any, refusal: str) -> None:
     state = state_in(Phase.READING)
     if paused_by:
         state, _ = advance(state, PauseRequested(1.0, paused_by))
@@ -113,7 +113,7 @@ def test_a_language_that_the_study_is_not_written_in_is_refused(protocol: Protoc
         initial_state(protocol, build_schedule(protocol, "P001", 1), {}, "nl")
 
 
-def test_nothing_that_is_printed_names_a_condition_a_liquid_or_a_delay() -> None:
+def test_printed_states_do_not_name_a_condition_liquid_or_delay() -> None:
     state, printed = small.opened(), []
     while state.phase not in FINAL:
         state, commands = advance(state, small.next_event(state, 1.0))

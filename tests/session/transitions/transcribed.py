@@ -114,7 +114,7 @@ STARTS: dict[str, Callable[[], SessionState]] = {
 
 
 def play(start: str, lines: list[str]) -> Iterator[str]:
-    """Yield each event with what it commands."""
+    """Yield each event with its commands."""
     state = STARTS[start]()
     for line in lines:
         yield line
@@ -131,20 +131,20 @@ def play(start: str, lines: list[str]) -> Iterator[str]:
 def _state(before: SessionState, after: SessionState) -> str:
     if after == before:
         return "the same state"
-    told = {name: getattr(after, name) for name in SHOWN}
+    fields = {name: getattr(after, name) for name in SHOWN}
     answers = {name: answer.value for name, answer in after.answers.items() if answer.given}
     trial = f", trial {after.trial.number}" if after.phase not in FINAL and isinstance(after.step, Trial) else ""
-    rest = ", ".join(f"{name} {value}" for name, value in told.items() if value and name not in ("phase", "index"))
-    heard = [(one.trial, one.success, one.correct, one.catch) for one in after.heard]
-    return f"{after.phase.name.lower()} at step {after.index}{trial}, {rest}, answers {answers}, heard {heard[-2:]}"
+    rest = ", ".join(f"{name} {value}" for name, value in fields.items() if value and name not in ("phase", "index"))
+    results = [(result.trial, result.success, result.correct, result.catch) for result in after.heard]
+    return f"{after.phase.name.lower()} at step {after.index}{trial}, {rest}, answers {answers}, heard {results[-2:]}"
 
 
 def said(command: Command) -> str:
     """Return a command in words, with what its own representation hides."""
     match command:
         case Write(line, measured, waits):
-            told = " ".join(f"{name}={_rounded(value)!r}" for name, value in line.fields().items())
-            return f"write {line.event} {told}{', measured' * measured}{', waits' * waits}"
+            fields = " ".join(f"{name}={_rounded(value)!r}" for name, value in line.fields().items())
+            return f"write {line.event} {fields}{', measured' * measured}{', waits' * waits}"
         case ShowPage(page):
             return f"show {_page(page)}"
         case StartTrial():
@@ -157,24 +157,24 @@ def said(command: Command) -> str:
                 f"{command.task.kind} for {command.task.limit_s:g} s{', adjusts' * command.adjusts}"
             )
         case Adjust(presented, delay_s, line):
-            told = {name: value for name, value in line.fields().items() if name != "scene"}
-            return f"adjust to {_rounded(presented.value)}, delay {delay_s:g} s, {told}"
+            fields = {name: value for name, value in line.fields().items() if name != "scene"}
+            return f"adjust to {_rounded(presented.value)}, delay {delay_s:g} s, {fields}"
         case _:
             return repr(command)
 
 
 def _page(page: Page) -> str:
-    told = []
+    parts = []
     for field in dataclasses.fields(page):
         value = getattr(page, field.name)
         if field.name in ("items", "item"):
             items = value if field.name == "items" else [value]
-            value = [(one.id, one.number, one.required, one.text, getattr(one, "options", ())) for one in items]
+            value = [(item.id, item.number, item.required, item.text, getattr(item, "options", ())) for item in items]
         if field.name in ("task", "coming") and value is not None:
             value = value.kind if field.name == "task" else value.trial
         if value != field.default:
-            told.append(f"{field.name}={_rounded(value)!r}")
-    return f"{type(page).__name__}({', '.join(told)})"
+            parts.append(f"{field.name}={_rounded(value)!r}")
+    return f"{type(page).__name__}({', '.join(parts)})"
 
 
 def _rounded(value: Any) -> Any:

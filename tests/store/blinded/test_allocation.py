@@ -41,7 +41,7 @@ GROUP_NAMES = ("first_thin", "first_thick")
 PREEXISTING = ('study.name = "grouped"\n', 'study.name = "grouped"\nstudy.group_assignment = "pre-existing"\n')
 
 
-def begun(folder: Path, participant: str, session: int = 1) -> SessionStore:
+def begin_session(folder: Path, participant: str, session: int = 1) -> SessionStore:
     who = {"seed": 11, "operator": "AB", "device": {"name": "scripted"}, "session": session}
     return studies.begun(folder, participant, grouped(), SOURCE, **who)
 
@@ -56,7 +56,7 @@ def test_participants_have_entries_in_the_order_of_their_first_sessions(
     synced: list[Path] = []
     monkeypatch.setattr(allocation, "sync_folder", synced.append)
     for number, participant in enumerate(("P009", "P001", "X"), start=1):
-        with begun(tmp_path / "s", participant) as store:
+        with begin_session(tmp_path / "s", participant) as store:
             assert store.lines[0].entry == number
             assert events(store) == ["session_started", "allocated"]
             assert allocate(StudyFolder(tmp_path / "s"), store.key, participant).entry == number  # type: ignore[union-attr]
@@ -72,10 +72,10 @@ def test_a_participant_keeps_the_group_in_session_2(tmp_path: Path) -> None:
     groups = {}
     for participant in ("P001", "P002"):
         for session in (1, 2):
-            with begun(study.path, participant, session) as store:
-                found = allocation_of(study, store.key, participant)
-                assert found is not None
-                assert groups.setdefault(participant, found.group) == found.group
+            with begin_session(study.path, participant, session) as store:
+                allocation = allocation_of(study, store.key, participant)
+                assert allocation is not None
+                assert groups.setdefault(participant, allocation.group) == allocation.group
                 assert ("allocated" in events(store)) == (session == 1), "once per participant"
     assert set(groups.values()) == set(GROUP_NAMES)
     own = session_protocol(study, grouped(), "P002", 2)
@@ -84,20 +84,20 @@ def test_a_participant_keeps_the_group_in_session_2(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_no_file_names_a_group_of_a_participant(tmp_path: Path) -> None:
-    """Of two folders that differ in the secret alone, everything readable is the same for other groups."""
+def test_readable_files_do_not_reveal_the_group_of_a_participant(tmp_path: Path) -> None:
+    """Folders that differ only in the secret have the same readable content although the groups differ."""
     readable: dict[str, str] = {}
     for number in range(12):
         study = StudyFolder(tmp_path / f"s{number}")
-        with begun(study.path, "P001") as store:
-            found = allocation_of(study, store.key, "P001")
+        with begin_session(study.path, "P001") as store:
+            allocation = allocation_of(study, store.key, "P001")
             line = next(line for line in raw(store.lines) if line["event"] == "allocated")
             (claim,) = (json.loads(path.read_text("utf-8")) for path in study.allocated.iterdir())
-        assert found is not None
+        assert allocation is not None
         assert set(line) == {"n", "event", "t_s", "at", "entry", "sealed", "previous"}
-        assert (claim.pop("sealed"), line["sealed"]) == (found.sealed, found.sealed)
+        assert (claim.pop("sealed"), line["sealed"]) == (allocation.sealed, allocation.sealed)
         assert claim == {"entry": 1, "participant": "P001", "place_in_group": True}
-        readable[found.group] = found.sealed
+        readable[allocation.group] = allocation.sealed
         receipt = json.loads(store.folder.receipt.read_text("utf-8"))
         assert "entry" not in receipt
         assert "group" not in receipt
@@ -112,9 +112,9 @@ def test_two_programs_at_once_never_share_an_entry(tmp_path: Path) -> None:
 
     @contextmanager
     def entered(program: int, number: int) -> Iterator[int]:
-        found = allocate(study, key, f"{'AB'[program]}{number}", waits=False)
-        assert found is not None
-        yield found.entry
+        allocation = allocate(study, key, f"{'AB'[program]}{number}", waits=False)
+        assert allocation is not None
+        yield allocation.entry
 
     assert sorted(entry for answers in race(entered, 40) for entry in answers) == list(range(1, 81))
     counts = Counter(allocation_of(study, key, claim.participant).group for claim in claims(study))  # type: ignore[union-attr]
@@ -127,15 +127,15 @@ def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folde
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = StudyFolder(tmp_path / "s")
-    begun(study.path, "P000").close()
+    begin_session(study.path, "P000").close()
     with monkeypatch.context() as patched:
         patched.setattr("study_app.store.sessions.begin.first_records", die)
-        assert forked(lambda: begun(study.path, "P001")) == -signal.SIGKILL
+        assert forked(lambda: begin_session(study.path, "P001")) == -signal.SIGKILL
     assert [claim.participant for claim in claims(study)] == ["P000", "P001"]
-    found = verify_study(study.path)
-    assert not found.errors
-    assert any("who does not have a session yet" in str(warning) for warning in found.warnings)
-    with begun(study.path, "P002") as other, begun(study.path, "P001") as store:
+    verification = verify_study(study.path)
+    assert not verification.errors
+    assert any("who does not have a session yet" in str(warning) for warning in verification.warnings)
+    with begin_session(study.path, "P002") as other, begin_session(study.path, "P001") as store:
         assert (store.lines[0].entry, other.lines[0].entry) == (2, 3)
         assert "allocated" in events(store)
 
@@ -145,7 +145,7 @@ def test_a_session_resumed_before_its_allocation_was_journalled_journals_it(
 ) -> None:
     with monkeypatch.context() as patched:
         patched.setattr("study_app.store.sessions.begin.note_allocation", lambda _: None)
-        with begun(tmp_path / "s", "P001") as store:
+        with begin_session(tmp_path / "s", "P001") as store:
             assert events(store) == ["session_started"]
     with reopen_store(store.folder.path, grouped(), SOURCE, operator="", device={}, screens={}) as again:
         assert events(again)[-1] == "allocated"
@@ -157,10 +157,10 @@ def test_a_session_resumed_before_its_allocation_was_journalled_journals_it(
 def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Path) -> None:
     study = StudyFolder(tmp_path / "s")
     for participant in ("P001", "P002", "P003"):
-        with begun(study.path, participant):
+        with begin_session(study.path, participant):
             pass
     first, second, third = sorted(study.allocated.iterdir())
-    held = [path.read_text("utf-8") for path in (first, second, third)]
+    content = [path.read_text("utf-8") for path in (first, second, third)]
 
     def errors() -> str:
         return "\n".join(str(error) for error in verify_study(study.path).errors)
@@ -169,26 +169,26 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     second.unlink()
     assert "is missing, although participant P002 has entry 2" in errors()
     with pytest.raises(StoreError, match=r"\b002\.json is missing, although participant P002 has entry 2"):
-        begun(study.path, "P002", 2)
-    second.write_text(held[0].replace('"entry": 1', '"entry": 2'), encoding="utf-8", newline="\n")
+        begin_session(study.path, "P002", 2)
+    second.write_text(content[0].replace('"entry": 1', '"entry": 2'), encoding="utf-8", newline="\n")
     assert "002.json: has been changed" in errors()
-    second.write_text(held[1], encoding="utf-8", newline="\n")
-    third.write_text(held[2].replace("P003", "P004"), encoding="utf-8", newline="\n")
+    second.write_text(content[1], encoding="utf-8", newline="\n")
+    third.write_text(content[2].replace("P003", "P004"), encoding="utf-8", newline="\n")
     assert "has been changed" in errors()
     with pytest.raises(StoreError, match="restore it from a backup"):
-        begun(study.path, "P003", 2)
-    third.write_text(re.sub('"sealed": "[^"]*"', '"group": "first_thin"', held[2]), encoding="utf-8", newline="\n")
+        begin_session(study.path, "P003", 2)
+    third.write_text(re.sub('"sealed": "[^"]*"', '"group": "first_thin"', content[2]), encoding="utf-8", newline="\n")
     assert "003.json: has been changed" in errors()
-    third.write_text(held[2], encoding="utf-8", newline="\n")
-    first.write_text(re.sub(r'(..)"}', '00"}', held[0]), encoding="utf-8", newline="\n")
+    third.write_text(content[2], encoding="utf-8", newline="\n")
+    first.write_text(re.sub(r'(..)"}', '00"}', content[0]), encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="has been changed: restore it from a backup"):
-        begun(study.path, "P001", 2)
-    first.write_text(held[0], encoding="utf-8", newline="\n")
+        begin_session(study.path, "P001", 2)
+    first.write_text(content[0], encoding="utf-8", newline="\n")
     key = open_or_draw_key(study.path, grouped())
     extra = allocate(study, key, "P009")
     assert extra is not None
     (study.allocated / "004.json").write_bytes(b"")  # of a program that ended before it wrote it
-    with begun(study.path, "P005") as store:
+    with begin_session(study.path, "P005") as store:
         assert store.lines[0].entry == 5
     assert errors() == ""
     assert "it will remain unused" in "\n".join(map(str, verify_study(study.path).warnings))
@@ -199,7 +199,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
 @needs_links
 def test_an_entry_that_cannot_be_read_counts_as_changed(tmp_path: Path) -> None:
     study = StudyFolder(tmp_path / "s")
-    with begun(study.path, "P001"):
+    with begin_session(study.path, "P001"):
         pass
     (loop := study.allocated / "006.json").symlink_to(loop)
     (error,) = verify_study(study.path).errors
@@ -221,12 +221,12 @@ def test_a_session_that_the_participants_own_group_does_not_have_is_refused(tmp_
     permitted = {}
     for participant in ("P001", "P002"):
         with studies.begun(folder.path, participant, protocol, (STUDY + groups).encode()) as store:
-            found = allocation_of(folder, store.key, participant)
-        assert found is not None
+            own_allocation = allocation_of(folder, store.key, participant)
+        assert own_allocation is not None
         allocation.check_session(folder, protocol, participant, 2)
         with contextlib.suppress(StudyError):
             allocation.check_session(folder, protocol, participant, 3)
-            permitted[found.group] = participant
+            permitted[own_allocation.group] = participant
     assert permitted.keys() == {"first_thick"}
 
 
@@ -261,9 +261,9 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
     study = StudyFolder(folder)
     key = open_or_draw_key(folder, grouped(), stream(3, "blinding").random)
     for session in study.sessions():
-        found = allocation_of(study, key, session.participant)
-        assert found is not None
-        own = grouped().for_session(found.group, 1)
+        allocation = allocation_of(study, key, session.participant)
+        assert allocation is not None
+        own = grouped().for_session(allocation.group, 1)
         lines = journal.read(session.journal)
         trials = [line["code"] for line in raw(lines) if line["event"] == "trial_started"]
         assert trials == [trial.code for trial in begun_schedule(own, start_of(lines), key).trials]
@@ -285,7 +285,7 @@ def _felt() -> ConditionFeatures:
 
 
 def test_simulated_participants_come_into_pre_existing_groups_by_their_shares(tmp_path: Path) -> None:
-    """One to two: each comes into the group that is furthest below its share, the first one in a tie."""
+    """With shares of one to two, each joins the group furthest below its share, the first one in a tie."""
     shares = GROUPS.replace("[groups.first_thick]\n", "[groups.first_thick]\nshare = 2\n")
     protocol, folder = grouped(PREEXISTING, groups=shares), StudyFolder(tmp_path / "s")
     source = (STUDY.replace(*PREEXISTING) + shares).encode()
@@ -323,6 +323,6 @@ def test_a_session_is_that_of_the_participants_group_which_must_be_known(tmp_pat
         session_protocol(folder, protocol, "P9", 1)
     with pytest.raises(StoreError, match=unknown):
         allocation.planned_sessions(folder, protocol, "P9")
-    one = grouped(("format = 2\n", 'format = 2\nsequence = ["hello", "thin", "thick"]\n'), groups="")
-    assert allocation.planned_sessions(folder, one, "P9") == 1
-    assert session_protocol(folder, one, "P9", 1).steps == ("hello", "thin", "thick")
+    study = grouped(("format = 2\n", 'format = 2\nsequence = ["hello", "thin", "thick"]\n'), groups="")
+    assert allocation.planned_sessions(folder, study, "P9") == 1
+    assert session_protocol(folder, study, "P9", 1).steps == ("hello", "thin", "thick")

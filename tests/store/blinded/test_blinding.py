@@ -19,12 +19,12 @@ from tests.protocol.trials.level_studies import study
 from tests.store.conftest import Tables
 
 
-def sealed(folder: Path) -> Path:
+def key_file(folder: Path) -> Path:
     return folder / "blinding" / "key.sealed"
 
 
 def content_of(folder: Path) -> dict[str, Any]:
-    content: dict[str, Any] = json.loads(base64.b64decode(sealed(folder).read_bytes()))
+    content: dict[str, Any] = json.loads(base64.b64decode(key_file(folder).read_bytes()))
     return content
 
 
@@ -35,7 +35,7 @@ def test_only_its_owner_may_read_the_key(tmp_path: Path, protocol: Protocol) -> 
         open_or_draw_key(tmp_path, protocol)
     finally:
         os.umask(before)
-    assert stat.S_IMODE(sealed(tmp_path).stat().st_mode) == 0o600
+    assert stat.S_IMODE(key_file(tmp_path).stat().st_mode) == 0o600
 
 
 def test_the_key_gives_every_code_its_condition(tmp_path: Path, tables_of_study: Tables) -> None:
@@ -52,7 +52,7 @@ def test_the_key_gives_every_code_its_condition(tmp_path: Path, tables_of_study:
 
 def test_the_file_is_encoded_and_its_sha256_is_the_keys_hash(tmp_path: Path, protocol: Protocol) -> None:
     key = open_or_draw_key(tmp_path, protocol)
-    raw = sealed(tmp_path).read_bytes()
+    raw = key_file(tmp_path).read_bytes()
     assert key.hash == hashlib.sha256(raw).hexdigest()
     assert not any(word in raw for word in (b"quagmire", b"mildew", b"see_tardy", b"1013.7"))
     assert set(content_of(tmp_path)["tables"]) == {"conditions", "liquids"}
@@ -60,10 +60,10 @@ def test_the_file_is_encoded_and_its_sha256_is_the_keys_hash(tmp_path: Path, pro
     assert "quagmire" not in repr(key)
 
 
-def test_who_comes_second_reads_what_the_first_drew(
+def test_the_second_of_two_concurrent_programs_reads_the_key_of_the_first(
     tmp_path: Path, protocol: Protocol, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The second has found no key and drawn its own; before it can put it down, the first has."""
+    """The second program has found no key and drawn one, but the first stores its key before it."""
     first: list[blinding.Key] = []
     create = blinding.create_folder
 
@@ -80,12 +80,12 @@ def test_a_real_key_comes_from_the_systems_randomness(
     tmp_path: Path, protocol: Protocol, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Seeding the global generator fixes nothing; the draws are ``secrets.SystemRandom``'s."""
-    drawn: list[float] = []
+    draws: list[float] = []
 
     class Watched(random.SystemRandom):
         def random(self) -> float:
-            drawn.append(super().random())
-            return drawn[-1]
+            draws.append(super().random())
+            return draws[-1]
 
     monkeypatch.setattr(blinding.secrets, "SystemRandom", Watched)
     keys = []
@@ -94,7 +94,7 @@ def test_a_real_key_comes_from_the_systems_randomness(
         random.seed(1)
         keys.append(open_or_draw_key(folder, protocol))
     assert keys[0].hash != keys[1].hash
-    assert len(drawn) == 2 * (32 + 2)  # the nonce, and one draw for each block of two
+    assert len(draws) == 2 * (32 + 2)  # the nonce, and one draw for each block of two
     assert keys[0].drawn == "system"
 
 
@@ -104,19 +104,19 @@ def test_a_rehearsals_key_follows_from_its_seed_and_does_not_mix_with_a_real_one
     for name in ("one", "two", "three", "real"):
         (tmp_path / name).mkdir()
     open_or_draw_key(tmp_path / "real", protocol)
-    one, two, three = (
+    first, second, third = (
         open_or_draw_key(tmp_path / name, protocol, stream(seed, "blinding").random)
         for name, seed in (("one", 1), ("two", 1), ("three", 2))
     )
-    assert one == two
-    assert (one.hash != three.hash, one.drawn) == (True, "seed")
+    assert first == second
+    assert (first.hash != third.hash, first.drawn) == (True, "seed")
     with pytest.raises(StoreError, match="one contains a rehearsal, which must not be mixed with real sessions"):
         open_or_draw_key(tmp_path / "one", protocol)
     with pytest.raises(StoreError, match="real contains real sessions, which must not be mixed with a rehearsal"):
         open_or_draw_key(tmp_path / "real", protocol, stream(1, "blinding").random)
 
 
-def test_no_other_key_is_drawn_for_a_session_that_has_only_its_receipt(tmp_path: Path, protocol: Protocol) -> None:
+def test_a_missing_key_is_not_replaced_if_a_session_receipt_exists(tmp_path: Path, protocol: Protocol) -> None:
     session = StudyFolder(tmp_path).session("P001", 1)
     session.path.mkdir(parents=True)
     session.receipt.write_text("{}", encoding="utf-8", newline="\n")
@@ -148,9 +148,9 @@ def test_lines_of_unblinding_that_cannot_be_read_are_numbered_from_1(tmp_path: P
 
 def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, protocol: Protocol) -> None:
     open_or_draw_key(tmp_path, protocol)
-    held = content_of(tmp_path)
+    key_content = content_of(tmp_path)
     later, *wrong = (
-        base64.encodebytes(json.dumps(held | changed).encode())
+        base64.encodebytes(json.dumps(key_content | changed).encode())
         for changed in (
             {"format": 3},
             {"drawn": "dice"},
@@ -158,13 +158,13 @@ def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, 
             {"files": {"honey.toml": 1}},
             {"groups": {"experts": 0}},
             {"groups": {"experts": 1.5}},
-            {"tables": held["tables"] | {"liquids": []}},
-            {"tables": held["tables"] | {"conditions": {"late": {"delay_ms": "50"}}}},
+            {"tables": key_content["tables"] | {"liquids": []}},
+            {"tables": key_content["tables"] | {"conditions": {"late": {"delay_ms": "50"}}}},
         )
     )
     no_key = r"key\.sealed is no longer a sealed key"
     contents = dict.fromkeys((b"", b"not base64 \xff", b"aGVsbG8=\n", b"W10=\n", b"e30=\n", *wrong), no_key)
     for content, sentence in (contents | {later: "has format 3, but this version reads only formats 1 and 2"}).items():
-        sealed(tmp_path).write_bytes(content)
+        key_file(tmp_path).write_bytes(content)
         with pytest.raises(StoreError, match=sentence):
             open_or_draw_key(tmp_path, protocol)

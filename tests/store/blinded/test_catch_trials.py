@@ -69,22 +69,22 @@ def study(inattentive: Path, tmp_path: Path) -> Path:
     return tmp_path / "study"
 
 
-def test_nothing_is_excluded_before_unblinding_and_both_are_after(study: Path) -> None:
+def test_inattentive_participants_are_excluded_only_after_unblinding(study: Path) -> None:
     assert exclusions(study) == ()
-    ran = CliRunner().invoke(commands, ["unblind", str(study), "--by", "AB", "--reason", "to analyse"])
-    assert ran.exit_code == 0
+    result = CliRunner().invoke(commands, ["unblind", str(study), "--by", "AB", "--reason", "to analyse"])
+    assert result.exit_code == 0
     rows = exclusions(study)
     assert {(row.participant, row.session, row.trial) for row in rows} == {("P001", 1, None), ("P002", 1, None)}
     assert {row.rule_or_person for row in rows} == {"catch"}
     counts = REASON.findall(rows[0].reason)
     assert sorted((block, of) for _, of, block in counts) == [("Practice (hard)", "10"), ("Viscosity", "20")]
     assert all(0.2 < int(wrong) / int(of) <= 1 for wrong, of, _ in counts)
-    assert f"excluded  participant P001, session 1: {rows[0].reason}" in ran.output
-    found = verify_study(study)
-    assert [str(one) for one in found.errors] == []
+    assert f"excluded  participant P001, session 1: {rows[0].reason}" in result.output
+    verification = verify_study(study)
+    assert [str(error) for error in verification.errors] == []
 
 
-def test_unblinding_again_repeats_nothing_and_keeps_what_a_person_decided(study: Path) -> None:
+def test_a_repeated_unblinding_keeps_the_decisions_of_persons(study: Path) -> None:
     assert len(unblind(study, "AB", "to analyse").excluded) == 2
     assert unblind(study, "AB", "once more").excluded == ()
     include(study, "P001", 1, by="AB", reason="the task was understood late")
@@ -93,22 +93,22 @@ def test_unblinding_again_repeats_nothing_and_keeps_what_a_person_decided(study:
 
 
 def test_sessions_that_cannot_be_excluded_are_named(study: Path) -> None:
-    listed = StudyFolder(study).exclusions
-    listed.write_text("torn", encoding="utf-8", newline="\n")
+    exclusion_list = StudyFolder(study).exclusions
+    exclusion_list.write_text("torn", encoding="utf-8", newline="\n")
     (warning,) = unblind(study, "AB", "to analyse").left
     assert warning.startswith("the rule “catch” was not applied (")
-    assert listed.read_text("utf-8") == "torn"
-    listed.unlink()
+    assert exclusion_list.read_text("utf-8") == "torn"
+    exclusion_list.unlink()
     assert len(unblind(study, "AB", "once more").excluded) == 2
 
 
 def test_running_sessions_are_not_judged(study: Path) -> None:
     opening = lock_folder(StudyFolder(study).session("P001", 1).path)
     try:
-        found = unblind(study, "AB", "to analyse")
+        unblinding = unblind(study, "AB", "to analyse")
     finally:
         opening.release()
-    assert [row.participant for row in found.excluded] == ["P002"]
+    assert [row.participant for row in unblinding.excluded] == ["P002"]
     assert [row.participant for row in unblind(study, "AB", "once more").excluded] == ["P001"]
 
 

@@ -43,12 +43,12 @@ def source_of(*edits: tuple[str, str]) -> bytes:
     return text.encode()
 
 
-def begun(folder: Path, source: bytes, participant: str, **given: object) -> SessionStore:
+def begin_session(folder: Path, source: bytes, participant: str, **given: object) -> SessionStore:
     return studies.begun(folder, participant, parse(source, "grouped"), source, **given)
 
 
 def order_of(protocol: Protocol, store: SessionStore) -> tuple[str, ...]:
-    """Return what a session presents, block and code of each trial: its order, where codes do not depend on chance."""
+    """Return block and code of each trial of a session: its order, because the codes are not random here."""
     start = start_of(store.lines)
     own = protocol.for_session(participant_group(start, store.key), start.session)
     return tuple(trial.block for trial in begun_schedule(own, start, store.key).trials)
@@ -65,7 +65,7 @@ class Lab:
 
     def arrive(self, who: str, group: str | None, row_of: str | None = None, *, stays: bool) -> None:
         protocol = parse(self.source, "grouped")
-        with begun(self.folder, self.source, who, group=group, row_of=row_of) as store:
+        with begin_session(self.folder, self.source, who, group=group, row_of=row_of) as store:
             own = participant_group(start_of(store.lines), store.key)
             assert own is not None
             if row_of is not None:
@@ -76,9 +76,9 @@ class Lab:
                 self.lost[who] = own
 
     def counts(self, group: str) -> list[int]:
-        found = Counter(order for own, order in self.orders.values() if own == group)
-        assert len(found) <= 2
-        return [*found.values(), *[0] * (2 - len(found))]
+        order_counts = Counter(order for own, order in self.orders.values() if own == group)
+        assert len(order_counts) <= 2
+        return [*order_counts.values(), *[0] * (2 - len(order_counts))]
 
 
 @pytest.mark.parametrize("seed", [1, 2, pytest.param(3, marks=pytest.mark.nightly)])
@@ -115,21 +115,21 @@ def test_sixteen_participants_have_each_order_four_times_in_each_group(tmp_path:
 def test_a_preexisting_group_is_recorded_and_never_inferred(tmp_path: Path) -> None:
     source, study = source_of(PREEXISTING), StudyFolder(tmp_path / "s")
     with pytest.raises(StudyError, match=r"the group is missing: .* the group of P001 with --group: experts, novices"):
-        begun(study.path, source, "P001")
+        begin_session(study.path, source, "P001")
     with pytest.raises(
         StudyError, match="group 'expert': grouped does not have this group; permitted: experts, novices"
     ):
-        begun(study.path, source, "P001", group="expert")
+        begin_session(study.path, source, "P001", group="expert")
     assert not study.path.exists()
-    with begun(study.path, source, "P001", group="novices") as store:
+    with begin_session(study.path, source, "P001", group="novices") as store:
         start = start_of(store.lines)
         assert (start.group, start.entry) == ("novices", 1)
         assert [line.event for line in store.lines] == ["session_started"]
         assert json.loads(store.folder.receipt.read_text("utf-8"))["group"] == "novices"
     assert resumed_choices(store.folder.path, protocol=_written(tmp_path, source)).group == "novices"
     with pytest.raises(StudyError, match="P001 is recorded in group novices, not experts"):
-        begun(study.path, source, "P001", group="experts", session=2)
-    with begun(study.path, source, "P001", session=2) as store:
+        begin_session(study.path, source, "P001", group="experts", session=2)
+    with begin_session(study.path, source, "P001", session=2) as store:
         assert start_of(store.lines).group == "novices"
     assert read_key(study.path).groups == {}, "nothing is drawn"
     table = study.participants("grouped").read_text("utf-8").splitlines()
@@ -139,7 +139,10 @@ def test_a_preexisting_group_is_recorded_and_never_inferred(tmp_path: Path) -> N
     assert "group" in [variable["name"] for variable in variables]
     assert not verify_study(study.path).errors
     further = [allocate(study, store.key, who, group=group) for who, group in (("P7", "novices"), ("P8", "experts"))]
-    assert [(made.group, made.entry) for made in further if made is not None] == [("novices", 2), ("experts", 1)]
+    assert [(allocation.group, allocation.entry) for allocation in further if allocation is not None] == [
+        ("novices", 2),
+        ("experts", 1),
+    ]
 
 
 def _written(folder: Path, source: bytes) -> str:
@@ -148,9 +151,9 @@ def _written(folder: Path, source: bytes) -> str:
     return str(path)
 
 
-def test_a_group_is_refused_where_groups_are_randomised_or_there_are_none(tmp_path: Path) -> None:
+def test_a_stated_group_is_refused_if_groups_are_randomised_or_absent(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="group 'experts': grouped assigns participants to its groups at random"):
-        begun(tmp_path / "s", source_of(), "P001", group="experts")
+        begin_session(tmp_path / "s", source_of(), "P001", group="experts")
     with pytest.raises(StudyError, match="group 'experts': demo does not have groups"):
         studies.begun(tmp_path / "demo", "P001", "demo", group="experts")
     assert not (tmp_path / "s").exists()
@@ -159,17 +162,17 @@ def test_a_group_is_refused_where_groups_are_randomised_or_there_are_none(tmp_pa
 
 def test_a_replacement_needs_a_participant_of_the_same_group(tmp_path: Path) -> None:
     folder, source = tmp_path / "s", source_of(PREEXISTING)
-    begun(folder, source, "P001", group="experts").close()
+    begin_session(folder, source, "P001", group="experts").close()
     with pytest.raises(StudyError, match="'P001' in group experts cannot be replaced by P002 in group novices"):
-        begun(folder, source, "P002", group="novices", row_of="P001")
+        begin_session(folder, source, "P002", group="novices", row_of="P001")
     with pytest.raises(
         StudyError, match="participant 'P009' cannot be replaced: this ID does not exist in this folder"
     ):
-        begun(folder, source, "P002", group="novices", row_of="P009")
-    begun(folder, source, "P002", group="experts", row_of="P001").close()
+        begin_session(folder, source, "P002", group="novices", row_of="P009")
+    begin_session(folder, source, "P002", group="experts", row_of="P001").close()
     with pytest.raises(StudyError, match="cannot be replaced: P002 is recorded as replacing P001"):
-        begun(folder, source, "P002", session=2, row_of="P009")
-    with begun(folder, source, "P002", session=2) as store:
+        begin_session(folder, source, "P002", session=2, row_of="P009")
+    with begin_session(folder, source, "P002", session=2) as store:
         assert (start_of(store.lines).row_of, start_of(store.lines).entry) == ("P001", 1)
     assert [(claim.participant, claim.entry, claim.replaces) for claim in claims(StudyFolder(folder))] == [
         ("P001", 1, None),
@@ -180,12 +183,12 @@ def test_a_replacement_needs_a_participant_of_the_same_group(tmp_path: Path) -> 
 def test_a_participant_who_withdrew_is_replaced_in_the_group(tmp_path: Path) -> None:
     folder, source = tmp_path / "s", source_of()
     for who in ("P001", "P002"):
-        with begun(folder, source, who) as store:
+        with begin_session(folder, source, who) as store:
             group = participant_group(start_of(store.lines), store.key)
             order = order_of(parse(source, "grouped"), store)
             store.finish("withdrawn")
     withdraw(folder, "P002", by="AB", reason="asked for it")
-    with begun(folder, source, "P050", row_of="P002") as store:
+    with begin_session(folder, source, "P050", row_of="P002") as store:
         assert participant_group(start_of(store.lines), store.key) == group
         assert order_of(parse(source, "grouped"), store) == order
         assert start_of(store.lines).row_of == "P002"
@@ -198,7 +201,7 @@ def test_verify_names_an_entry_that_was_changed(tmp_path: Path, edits: tuple[tup
     study, source = StudyFolder(tmp_path / "s"), source_of(*edits)
     group = {"group": "experts"} if edits else {}
     for who, row_of in (("P001", None), ("P002", "P001")):
-        begun(study.path, source, who, row_of=row_of, **group).close()
+        begin_session(study.path, source, who, row_of=row_of, **group).close()
     stem = "experts-001" if edits else "001"
     first, second = study.allocated / f"{stem}.json", study.allocated / f"{stem}-P002.json"
     whole = second.read_text("utf-8")
@@ -219,15 +222,15 @@ def _errors(study: StudyFolder) -> str:
     return "\n".join(map(str, verify_study(study.path).errors))
 
 
-def test_a_folder_of_an_earlier_version_goes_on_by_the_numbers_of_ids(tmp_path: Path) -> None:
-    """Its entries do not say that places in groups assign rows."""
+def test_a_folder_of_an_earlier_version_continues_with_numbers_of_ids(tmp_path: Path) -> None:
+    """Its entries lack the note that rows are assigned by the place in the group."""
     study, source = StudyFolder(tmp_path / "s"), source_of()
-    begun(study.path, source, "P001").close()
+    begin_session(study.path, source, "P001").close()
     path = study.allocation(1)
     path.write_text(path.read_text("utf-8").replace(', "place_in_group": true', ""), encoding="utf-8", newline="\n")
     orders = {}
     for who, row_of in (("P002", None), ("P004", None), ("P003", None), ("P060", "P003")):
-        with begun(study.path, source, who, row_of=row_of) as store:
+        with begin_session(study.path, source, who, row_of=row_of) as store:
             start = start_of(store.lines)
             assert start.place_in_group is None
             assert start.entry == len(claims(study)), "a replacement has an entry of its own"
@@ -237,4 +240,4 @@ def test_a_folder_of_an_earlier_version_goes_on_by_the_numbers_of_ids(tmp_path: 
     assert orders["P002"] != orders["P003"] or orders["P004"] != orders["P003"]
     assert orders["P060"] == orders["P003"]
     with pytest.raises(StudyError, match="assigns rows by the number in the ID"):
-        begun(study.path, source, "P061", row_of="anna")
+        begin_session(study.path, source, "P061", row_of="anna")

@@ -22,15 +22,15 @@ PEOPLE = 8
 pytestmark = pytest.mark.slow
 
 
-def held(folder: Path, codes: str) -> Path:
+def rehearse_study(folder: Path, codes: str) -> Path:
     text = source_bytes("demo").decode()
     study = folder / f"{codes}.toml"
     study.write_text(text.replace("[study]", f'[study]\ncodes = "{codes}"', 1), encoding="utf-8", newline="\n")
     return rehearse_answers(study, participants=PEOPLE, seed=3, results=folder / codes, features=made_up("demo"))
 
 
-def test_one_look_at_a_condition_tells_nothing_of_other_participants(tmp_path: Path) -> None:
-    folder, same = held(tmp_path, "participant"), held(tmp_path, "study")
+def test_revealing_own_codes_of_one_participant_does_not_reveal_others(tmp_path: Path) -> None:
+    folder, same = rehearse_study(tmp_path, "participant"), rehearse_study(tmp_path, "study")
     key = read_key(folder)
     meant: dict[str, set[str]] = {}
     for session in StudyFolder(folder).sessions():
@@ -38,23 +38,23 @@ def test_one_look_at_a_condition_tells_nothing_of_other_participants(tmp_path: P
         for line, whole in zip(lines, open_events(lines, key), strict=True):
             if isinstance(line, TrialStarted) and isinstance(whole, TrialStarted) and line.block == "delays":
                 meant.setdefault(line.code, set()).add(key.condition(whole.block, whole.code))
-        found = reproduce_session(session.path)
-        assert found.differences == []
+        reproduction = reproduce_session(session.path)
+        assert reproduction.differences == []
     assert meant == {"D1": {"prompt", "late"}, "D2": {"prompt", "late"}}
     assert verify_study(folder).errors == ()
 
-    blinded, usual = (evaluate(load_study(one)) for one in (folder, same))
+    blinded, usual = (evaluate(load_study(study_folder)) for study_folder in (folder, same))
     assert not any(value for block in blinded.blocks for value in block.findings.values())
     assert all(any(block.findings.values()) for block in usual.blocks)
 
-    for one in (folder, same):
-        assert unblind(one, by="AB", reason="a test").left == ()
-        assert verify_study(one).errors == ()
-    assert coded(folder) == coded(same)
+    for study_folder in (folder, same):
+        assert unblind(study_folder, by="AB", reason="a test").left == ()
+        assert verify_study(study_folder).errors == ()
+    assert coded_answers(folder) == coded_answers(same)
 
 
-def coded(folder: Path) -> list[tuple[str, ...]]:
-    """Return what the tables say was presented to whom, and answered."""
+def coded_answers(folder: Path) -> list[tuple[str, ...]]:
+    """Return participant, presented condition and answer of each row of the tables."""
     names = ("participant", "trial", "block", "code", "item", "response")
     paths = sorted(folder.rglob("*_description-responses_data.csv"))
     rows = (row for path in paths for row in csv.DictReader(path.read_text(encoding="utf-8").splitlines()))

@@ -25,8 +25,8 @@ RECORDING = f"{SESSION}/recordings/trial-001.parquet"
 FRAMES = f"{SESSION}/recordings/trial-001_frames.parquet"
 
 
-def held(start: Start, samples: list[Any], **given: Any) -> Path:
-    """Return the folder of a study with one session, in which these samples were recorded, trial by trial."""
+def record_session(start: Start, samples: list[Any], **given: Any) -> Path:
+    """Return the folder of a study with one session that recorded these samples, trial by trial."""
     store = start(recordings=True, clock=ticking_clock(), simulated=True, **given)
     assert store.recorder is not None
     about: dict[str, Any] = {"block": "b", "phase": "main", "part": 1, "of": len(samples), "code": "L1"}
@@ -42,7 +42,7 @@ def held(start: Start, samples: list[Any], **given: Any) -> Path:
 
 
 def contents(study: Path) -> dict[str, bytes]:
-    """Return the files of a study, but for locks, and who opened its key when."""
+    """Return the files of a study except locks and the record of its unblinding."""
     files = (
         path for path in study.rglob("*") if path.is_file() and path.name[0] != "." and path.name != "reveals.jsonl"
     )
@@ -51,10 +51,10 @@ def contents(study: Path) -> dict[str, bytes]:
 
 @pytest.fixture
 def study(start: Start, samples_of: Make) -> Path:
-    return held(start, [samples_of(2_500), samples_of(3_500, seed=6)])
+    return record_session(start, [samples_of(2_500), samples_of(3_500, seed=6)])
 
 
-def test_recordings_of_about_one_length_are_equally_long_and_are_read_with_the_key_alone(study: Path) -> None:
+def test_sealed_recordings_have_rounded_lengths_and_are_read_only_with_the_key(study: Path) -> None:
     samples, frames = study / RECORDING, study / FRAMES
     assert samples.read_bytes().startswith(b"This file is sealed until the study is unblinded")
     for path in (samples, frames):
@@ -69,22 +69,22 @@ def test_recordings_of_about_one_length_are_equally_long_and_are_read_with_the_k
 def test_an_unblinded_study_holds_the_recordings_of_one_that_was_never_sealed(
     study: Path, start: Start, samples_of: Make, tmp_path: Path
 ) -> None:
-    kept = shutil.copy(study / "fingerprints.txt", tmp_path / "kept.txt")
+    copy = shutil.copy(study / "fingerprints.txt", tmp_path / "kept.txt")
     other = tmp_path / "open" / "study"
     (other / "blinding").mkdir(parents=True)
     shutil.copy(study / "blinding" / "key.sealed", other / "blinding")
     reveal(other, "AB", "no blinding")
-    held(start, [samples_of(2_500), samples_of(3_500, seed=6)], results=other)
+    record_session(start, [samples_of(2_500), samples_of(3_500, seed=6)], results=other)
     assert unblind(study, "AB", "done").left == ()
     ours, theirs = contents(study), contents(other)
     assert {name: ours[name] for name in ours if name.endswith((".parquet", ".csv"))} == {
         name: theirs[name] for name in theirs if name.endswith((".parquet", ".csv"))
     }
-    for found in (verify_study(study, Path(kept)), verify_study(other)):
-        assert (found.errors, found.warnings) == ((), ())
+    for verification in (verify_study(study, Path(copy)), verify_study(other)):
+        assert (verification.errors, verification.warnings) == ((), ())
 
 
-def test_what_a_killed_unblinding_left_is_removed_by_the_next(study: Path) -> None:
+def test_temporary_files_of_a_killed_unblinding_are_removed_by_the_next(study: Path) -> None:
     folders = (study, study / "data", study / SESSION, (study / RECORDING).parent)
     left = [path / f".{path.name}.0123abcd.tmp" for path in folders]
     for path in left:
@@ -95,10 +95,10 @@ def test_what_a_killed_unblinding_left_is_removed_by_the_next(study: Path) -> No
 
 
 def test_a_sealed_recording_is_withdrawn(study: Path) -> None:
-    held = (study / RECORDING).read_bytes()
-    done = withdraw(study, "P007", by="AB", reason="asked")
-    assert (done.folders, done.left) == ((study,), ())
-    assert not [path for path in study.rglob("*") if path.is_file() and held[100:200] in path.read_bytes()]
+    content = (study / RECORDING).read_bytes()
+    withdrawal = withdraw(study, "P007", by="AB", reason="asked")
+    assert (withdrawal.folders, withdrawal.left) == ((study,), ())
+    assert not [path for path in study.rglob("*") if path.is_file() and content[100:200] in path.read_bytes()]
     assert verify_study(study).errors == ()
 
 
@@ -109,7 +109,7 @@ def in_line(event: str, **changes: Any) -> Any:
     return edit
 
 
-def test_what_differs_from_the_sealed_value_is_found_before_the_study_is_opened(study: Path) -> None:
+def test_a_recording_that_differs_from_its_sealed_value_is_found_before_unblinding(study: Path) -> None:
     change(study / SESSION, in_line("recorded", samples_recorded=2_499))
     assert f"{RECORDING}: contains rows 2500, but the journal says 2499" in map(str, verify_study(study).errors)
     forge(study / SESSION / "journal.jsonl", in_line("recorded", sealed="00" * 1040))
@@ -135,7 +135,7 @@ def test_an_unblinding_that_is_killed_anywhere_is_finished_by_the_next(study: Pa
     whole = tmp_path / "whole"
     shutil.copytree(study, whole)
     unblind(whole, "AB", "done")
-    sealed, opened = contents(study), contents(whole)
+    sealed, open_contents = contents(study), contents(whole)
     at, code = first, -signal.SIGKILL
     while code == -signal.SIGKILL:
         copy = tmp_path / "killed"
@@ -147,16 +147,16 @@ def test_an_unblinding_that_is_killed_anywhere_is_finished_by_the_next(study: Pa
             os._exit(0)
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         for name in (RECORDING, FRAMES):
-            assert (copy / name).read_bytes() in (sealed[name], opened[name])
+            assert (copy / name).read_bytes() in (sealed[name], open_contents[name])
         assert not [error for error in verify_study(copy).errors if ".parquet" in str(error)]
         assert unblind(copy, "AB", "again").left == ()
-        assert contents(copy) == opened
+        assert contents(copy) == open_contents
         at += 4
     assert at > 20
 
 
 def dies_at(number: int, folder: Path) -> None:
-    """Kill this process before it opens or renames a file of a folder for so many times."""
+    """Kill this process before its n-th opening or renaming of a file in a folder."""
     left = iter(range(number, -1, -1))
 
     def watched(event: str, arguments: tuple[Any, ...]) -> None:

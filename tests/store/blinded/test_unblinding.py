@@ -44,22 +44,22 @@ def sound(folder: Path) -> bool:
     return findings.is_sound
 
 
-def test_a_sealed_study_holds_no_column_that_tells_a_condition(tmp_path: Path, finished: Start) -> None:
+def test_tables_of_a_sealed_study_lack_the_sealed_columns(tmp_path: Path, finished: Start) -> None:
     store = finished()
     folder = tmp_path / "study"
     assert names(store.folder.table("brackish", "trials")) == set(header(unsealed_columns(TRIALS)))
     for path in folder.rglob("*.*"):
         if path.is_file():
-            held = path.read_bytes()
-            assert not [name for name in SEALED if f'"{name}"'.encode() in held], path
+            content = path.read_bytes()
+            assert not [name for name in SEALED if f'"{name}"'.encode() in content], path
     assert sound(folder)
 
 
 @pytest.mark.slow
-def test_unblinding_gives_what_an_open_study_would_have_held(
+def test_an_unblinded_study_equals_one_that_was_never_blinded(
     tmp_path: Path, protocol: Protocol, start: Start, attend: Attend
 ) -> None:
-    """Of one key, one is opened before its sessions and one after; the tables are the same, byte for byte."""
+    """Two studies with the same key, one opened before and one after its sessions, have identical tables."""
     folders = [tmp_path / name / "study" for name in ("before", "after")]
     for folder in folders:
         folder.mkdir(parents=True)
@@ -80,12 +80,12 @@ def test_unblinding_gives_what_an_open_study_would_have_held(
     assert before.keys() == sealed_tables.keys()
     assert before != sealed_tables
     steps: list[tuple[str, float]] = []
-    found = unblind(folders[1], "AB", "done", lambda step, done: steps.append((step, done)))
+    unblinding = unblind(folders[1], "AB", "done", lambda step, step_number: steps.append((step, step_number)))
     assert steps == [
         ("opening session 1 of 2", 0.0), ("opening session 2 of 2", 1 / 3), ("writing the tables of the study", 2 / 3),
     ]  # fmt: skip
-    assert found.left == ()
-    assert set(found.codes) == {"practice", "liquids", "delays"}
+    assert unblinding.left == ()
+    assert set(unblinding.codes) == {"practice", "liquids", "delays"}
     assert tables_in(folders[1]) == before
     assert b",0.9," in before["data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv"]
     assert b",invalid,n/a\n" in before["data/study-brackish_description-participants_data.csv"]
@@ -97,7 +97,7 @@ def test_unblinding_gives_what_an_open_study_would_have_held(
 
 
 @pytest.mark.slow
-def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
+def test_a_repeated_unblinding_finishes_an_interrupted_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, finished: Start
 ) -> None:
     """Ended between a session's table and its checksum."""
@@ -118,16 +118,16 @@ def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
     assert unblind(folder, "AB", "again").left == ()
     assert module.is_unblinded(folder)
     assert sound(folder)
-    held = tables_in(folder)
+    files_before = tables_in(folder)
     assert unblind(folder, "AB", "once more").left == ()
     assert [row["reason"] for row in module.reveals_of(folder)] == ["done", "again", "once more"]
-    assert tables_in(folder) == held
+    assert tables_in(folder) == files_before
 
 
 @pytest.mark.parametrize(
     "change", [lambda table: table.replace(b"complete", b"repaired", 1), lambda table: table[:-2] + b"x\n"]
 )
-def test_a_table_of_a_session_that_goes_on_is_completed_and_a_changed_one_is_left(
+def test_tables_of_a_resumed_session_are_completed_unless_they_were_changed(
     tmp_path: Path, start: Start, attend: Attend, change: Callable[[bytes], bytes]
 ) -> None:
     """The first table lacks half its last line, as after a crash; in the second the first or last cell was changed."""
@@ -164,14 +164,16 @@ def test_tables_that_say_more_than_a_cut_journal_are_left_with_the_remedy(
     assert [path.read_bytes() for path in tables] == before
 
 
-def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start: Start, attend: Attend) -> None:
-    """Sealed before and after the key was opened: the tables have everything once it was."""
+def test_a_session_continues_to_seal_after_unblinding(
+    tmp_path: Path, protocol: Protocol, start: Start, attend: Attend
+) -> None:
+    """Events stay sealed after the key was opened; the tables then contain all columns."""
     with start() as store:
         attend(store)
     unblind(tmp_path / "study", "AB", "done")
     again = reopen_store(store.folder.path, protocol, SOURCE, operator="AB", device={"name": "scripted"}, screens={})
-    told = {"block": "delays", "phase": "main", "part": 2, "index": 2, "of": 2, "code": "D1"}
-    again.append(journal_events.TrialStarted(trial=6, attempt=1, **told))
+    fields = {"block": "delays", "phase": "main", "part": 2, "index": 2, "of": 2, "code": "D1"}
+    again.append(journal_events.TrialStarted(trial=6, attempt=1, **fields))
     again.append(event_of("trial_ended", trial=6, attempt=1, outcome="complete", force_mean_n=1.25))
     again.finish("completed")
     assert journal.read(again.folder.journal)[-2].sealed
@@ -180,7 +182,7 @@ def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start
 
 
 def in_clear(store: SessionStore, study: StudyHead) -> None:
-    """Make of a finished session one of an earlier version, which sealed nothing."""
+    """Turn a finished session into one of an earlier version, which did not seal fields."""
     lines = raw(open_events(journal.read(store.folder.journal), store.key))
     del lines[0]["measures_sealed"]
 
@@ -205,9 +207,9 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     later = finished("P008")
     assert not SEALED & names(later.folder.table("brackish", "trials"))
     assert sound(folder)
-    held = store.folder.table("brackish", "trials").read_bytes()
+    content = store.folder.table("brackish", "trials").read_bytes()
     assert unblind(folder, "AB", "done").left == ()
-    assert store.folder.table("brackish", "trials").read_bytes() == held
+    assert store.folder.table("brackish", "trials").read_bytes() == content
     assert names(later.folder.table("brackish", "trials")) == set(header(TRIALS))
     assert sound(folder)
 
@@ -215,12 +217,12 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
 @pytest.fixture
 def sites(tmp_path: Path) -> Path:
     """A merged study of two sites, of which the keys were not opened."""
-    held = {"merged_at": AT, "key_hash": "a" * 64, "sessions": 1, "withdrawals": 0}
+    fields = {"merged_at": AT, "key_hash": "a" * 64, "sessions": 1, "withdrawals": 0}
     for name in ("north", "south"):
         (tmp_path / "both" / "sites" / name / "blinding").mkdir(parents=True)
-    listed = {"format": 2, "study": "stirring", "protocol_hash": "c" * 64}
-    listed |= {"sites": [{"name": name, **held} for name in ("north", "south")]}
-    (tmp_path / "both" / "sites.json").write_text(json.dumps(listed), encoding="utf-8", newline="\n")
+    field_values = {"format": 2, "study": "stirring", "protocol_hash": "c" * 64}
+    field_values |= {"sites": [{"name": name, **fields} for name in ("north", "south")]}
+    (tmp_path / "both" / "sites.json").write_text(json.dumps(field_values), encoding="utf-8", newline="\n")
     return tmp_path / "both"
 
 
@@ -229,12 +231,12 @@ def test_a_merged_study_is_opened_site_by_site(sites: Path) -> None:
         site: {"at": AT, "by": by, "reason": f"{site} is done", "key_hash": "a" * 64}
         for site, by in (("south", "CD"), ("north", "AB"))
     }
-    for site, opened in (("south", False), ("north", True)):
+    for site, is_open in (("south", False), ("north", True)):
         assert not module.has_opened_keys(sites)
         path = StudyFolder(sites / "sites" / site).reveals
         path.write_text(f"{json.dumps(records[site])}\n", encoding="utf-8", newline="\n")
         assert module.has_opened_keys(sites / "sites" / site)
-        assert module.has_opened_keys(sites) == opened
+        assert module.has_opened_keys(sites) == is_open
     assert module.reveals_of(sites) == tuple({"site": site, **records[site]} for site in ("north", "south"))
     assert module.reveals_of(sites / "sites" / "south") == (records["south"],)
     assert not module.is_unblinded(sites), "the columns are not described yet"
@@ -243,30 +245,30 @@ def test_a_merged_study_is_opened_site_by_site(sites: Path) -> None:
 def test_all_keys_are_verified_before_the_first_is_opened_and_exclusions_name_the_site(
     sites: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[Any] = []
+    calls: list[Any] = []
 
-    def opened(folder: Path, *words: object) -> module.Unblinded:
-        asked.append((folder.name, *words))
+    def fake_unblind(folder: Path, *arguments: object) -> module.Unblinded:
+        calls.append((folder.name, *arguments))
         row = Exclusion(
             participant="P7", session=2, trial=None, rule_or_person=module.RULE, reason=folder.name, excluded_at=AT
         )
         return module.Unblinded({"b": {"A1": folder.name}}, (f"{folder.name} is left",), (row,))
 
-    monkeypatch.setattr(module, "unblind", opened)
-    monkeypatch.setattr(module, "verified_key", lambda study: asked.append(study.path.name))
-    done = module.unblind_folder(sites, "AB", "closed", print)
+    monkeypatch.setattr(module, "unblind", fake_unblind)
+    monkeypatch.setattr(module, "verified_key", lambda study: calls.append(study.path.name))
+    unblinding = module.unblind_folder(sites, "AB", "closed", print)
     words = ("AB", "closed", print)
-    assert asked == ["north", "south", ("north", *words), ("south", *words)]
-    assert {prefix: (it.codes, it.left) for prefix, it in done.items()} == {
+    assert calls == ["north", "south", ("north", *words), ("south", *words)]
+    assert {prefix: (it.codes, it.left) for prefix, it in unblinding.items()} == {
         f"{site}-": ({"b": {"A1": site}}, (f"{site} is left",)) for site in ("north", "south")
     }
-    rows = [row for result in done.values() for row in result.excluded]
+    rows = [row for result in unblinding.values() for row in result.excluded]
     assert [(row.participant, row.session, row.reason) for row in rows] == [
         ("north-P7", 2, "north"), ("south-P7", 2, "south"),
     ]  # fmt: skip
-    asked.clear()
+    calls.clear()
     assert list(module.unblind_folder(sites / "sites" / "south", "AB", "closed", print)) == [""]
-    assert asked == [("south", *words)]
+    assert calls == [("south", *words)]
 
 
 def test_catch_trials_are_judged_block_by_block(finished: Start, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,12 +33,12 @@ def three_answers(path: Path) -> Path:
 def test_a_line_explains_itself_and_is_returned_as_it_will_be_read(tmp_path: Path, clock: SessionClock) -> None:
     path = tmp_path / "journal.jsonl"
     with Journal.create(path, clock) as journal:
-        written = [
+        events = [
             journal.append(event_of("shown", page="consent")),
             journal.append(event_of("counted", item="calm", value=None), t_s=12.3456789),
         ]
-    assert read(path) == written
-    assert written[1].line() == {
+    assert read(path) == events
+    assert events[1].line() == {
         "n": 2,
         "event": "counted",
         "t_s": 12.345679,
@@ -66,7 +66,7 @@ def test_cut_at_any_byte_it_reads_to_the_last_whole_line(tmp_path: Path) -> None
         assert contents.damage is None
 
 
-def test_a_broken_a_missing_and_a_doubled_line_are_damage_and_a_torn_tail_is_none(tmp_path: Path) -> None:
+def test_broken_missing_and_doubled_lines_are_damage_but_an_incomplete_last_line_is_not(tmp_path: Path) -> None:
     path = three_answers(tmp_path / "journal.jsonl")
     whole = path.read_bytes()
     lines = whole.splitlines(keepends=True)
@@ -77,9 +77,9 @@ def test_a_broken_a_missing_and_a_doubled_line_are_damage_and_a_torn_tail_is_non
         contents = scan(path)
         assert (len(contents.lines), contents.torn_bytes, contents.damage) == (4, len(tail), None)
     for broken in ((1,), (3,), (2, 3), (1, 2, 3)):
-        held = b"".join(b"#" + line[1:] if number in broken else line for number, line in enumerate(lines))
+        damaged = b"".join(b"#" + line[1:] if number in broken else line for number, line in enumerate(lines))
         for tail in (b"", b'{"n":5,"ev'):
-            path.write_bytes(held + tail)
+            path.write_bytes(damaged + tail)
             with pytest.raises(StoreError, match=rf"journal\.jsonl, line {broken[0] + 1} is damaged: restore"):
                 read(path)
             assert (len(scan(path).lines), scan(path).torn_bytes) == (broken[0], 0)
@@ -114,7 +114,7 @@ NAN = float("nan")
         ("_AnyAnswer", ["a", 1, ["a"]], [None, [1], {}, NAN]),
     ],
 )
-def test_each_kind_of_value_is_told_from_others(kind: str, valid: list[Any], invalid: list[Any]) -> None:
+def test_each_kind_of_value_is_distinguished_from_others(kind: str, valid: list[Any], invalid: list[Any]) -> None:
     holds = get_args(getattr(journal_events, kind))[1].holds
     assert [[holds(value) for value in values] for values in (valid, invalid)] == [
         [True] * len(valid), [False] * len(invalid),
@@ -128,7 +128,7 @@ def test_a_field_that_every_line_has_is_never_null(name: str) -> None:
     assert f"(note) has {name} " in str(line_problem(line | {name: None}))
 
 
-def test_a_journal_is_neither_written_over_nor_continued_after_another_program(tmp_path: Path) -> None:
+def test_a_journal_changed_by_another_program_is_neither_overwritten_nor_continued(tmp_path: Path) -> None:
     path = three_answers(tmp_path / "journal.jsonl")
     contents = scan(path)
     with path.open("ab") as file:
@@ -146,19 +146,19 @@ def test_a_journal_is_neither_written_over_nor_continued_after_another_program(t
 
 
 def test_an_answer_keeps_when_it_was_first_shown_and_chosen_and_counts_its_changes() -> None:
-    shown = journal_events.Answer().shown(2.0)
-    assert shown.shown(3.0) == shown == journal_events.Answer(onset_s=2.0)
-    first = shown.chosen(4.0, 3)
+    shown_answer = journal_events.Answer().shown(2.0)
+    assert shown_answer.shown(3.0) == shown_answer == journal_events.Answer(onset_s=2.0)
+    first = shown_answer.chosen(4.0, 3)
     assert first == journal_events.Answer(onset_s=2.0, first_s=4.0, last_s=4.0, changes=0, value=3)
     assert first.chosen(5.0, 3) == first, "the same choice again changes nothing"
     changed = first.chosen(6.0, 5).chosen(7.0, None)
     assert changed == journal_events.Answer(onset_s=2.0, first_s=4.0, last_s=7.0, changes=2, value=None)
     assert changed.chosen(8.0, None) == changed
-    assert changed.removed() == shown
-    assert [answer.given for answer in (shown, first, changed, changed.removed())] == [False, True, True, False]
+    assert changed.removed() == shown_answer
+    assert [answer.given for answer in (shown_answer, first, changed, changed.removed())] == [False, True, True, False]
 
 
-def test_a_closed_journal_takes_no_line_and_says_what_was_lost(tmp_path: Path) -> None:
+def test_a_closed_journal_refuses_lines_and_names_the_lost_one(tmp_path: Path) -> None:
     path = three_answers(tmp_path / "journal.jsonl")
     journal = Journal.reopen(path, scan(path), SessionClock())
     assert not journal.is_closed
@@ -166,25 +166,25 @@ def test_a_closed_journal_takes_no_line_and_says_what_was_lost(tmp_path: Path) -
     journal.close()
     assert journal.is_closed
     assert (fifth.n, read(path)[-1]) == (5, fifth)
-    with pytest.raises(StoreError) as refused:
+    with pytest.raises(StoreError) as error:
         journal.append(event_of("counted", value=6))
-    assert str(refused.value) == (
+    assert str(error.value) == (
         f"{path} is closed: 'counted' occurred after the end of the session and was not recorded"
     )
     assert len(read(path)) == 5
 
 
-def test_what_a_reader_would_call_damage_is_not_written(tmp_path: Path) -> None:
+def test_events_that_a_reader_would_reject_are_not_written(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
     with Journal.create(path) as journal:
-        for told, sentence in (
+        for fields, sentence in (
             ({"t_s": -0.001}, "(note) has an invalid t_s, -0.001"),
             ({"t_s": 1e10}, "(note) has an invalid t_s, 1e+10"),
             ({"kind": 3}, "(note) has kind 3; expected: text"),
         ):
-            note = journal_events.Note(kind=told.get("kind", "note"), text="x")
+            note = journal_events.Note(kind=fields.get("kind", "note"), text="x")
             with pytest.raises(StoreError, match=re.escape(f"line 1 {sentence}")):
-                journal.append(note, t_s=told.get("t_s"))
+                journal.append(note, t_s=fields.get("t_s"))
         mixed = {"a": np.int64(3), "b": np.float32(0.5), "c": float("nan"), "d": (np.inf, np.array([1.0, np.nan]))}
         journal.append(journal_events.Note(kind="note", text="half \ud83c here", others={"mixed": mixed}))
     (line,) = read(path)
@@ -192,8 +192,8 @@ def test_what_a_reader_would_call_damage_is_not_written(tmp_path: Path) -> None:
     assert json.loads(path.read_text(encoding="utf-8"))["text"] == line.text == "half \ud83c here"
 
 
-def test_times_come_from_the_monotonic_clock_which_may_go_on() -> None:
-    """The wall clock is read once; who sets it back moves no time."""
+def test_times_come_from_the_monotonic_clock() -> None:
+    """The wall clock is read once, so that setting it back does not change times."""
     now = [7_000]
     began = SessionClock(lambda: now[0], datetime(2026, 10, 25, 1, 59, 59, tzinfo=timezone(timedelta(hours=2))))
     resumed = SessionClock(lambda: now[0], shown_s=3600.0)
@@ -204,7 +204,7 @@ def test_times_come_from_the_monotonic_clock_which_may_go_on() -> None:
 
 
 @needs_posix
-def test_a_journal_that_is_no_longer_under_its_name_takes_no_line_until_it_is_back(tmp_path: Path) -> None:
+def test_a_renamed_journal_refuses_lines_until_it_is_moved_back(tmp_path: Path) -> None:
     path, away = tmp_path / "journal.jsonl", tmp_path / "away.jsonl"
     with Journal.create(path) as journal:
         journal.append(event_of("counted", value=1))
@@ -221,7 +221,7 @@ def test_a_journal_that_is_no_longer_under_its_name_takes_no_line_until_it_is_ba
 
 
 @needs_links
-def test_a_journal_whose_folder_was_replaced_by_a_link_takes_no_line(tmp_path: Path) -> None:
+def test_a_journal_in_a_folder_replaced_by_a_link_refuses_lines(tmp_path: Path) -> None:
     folder, away = tmp_path / "ses-01", tmp_path / "away"
     folder.mkdir()
     with Journal.create(folder / "journal.jsonl") as journal:
@@ -273,9 +273,9 @@ def test_every_stored_line_follows_the_schema() -> None:
         schema.validate(json.loads(line))
 
 
-def test_an_event_of_another_version_is_told_once_and_what_the_store_writes_is_known(finished: Start) -> None:
+def test_unknown_events_are_listed_once_and_written_events_are_known(finished: Start) -> None:
     lines = [line("weather", wind="x"), line("note", kind="note", text=""), line("weather")]
     assert list(unknown_events(list(map(journal_events.read_event, lines)))) == ["weather"]
-    written = finished(recordings=True).lines
-    assert list(unknown_events(written)) == []
-    assert {line_problem(each) for each in (*lines, *raw(written))} == {None}
+    written_lines = finished(recordings=True).lines
+    assert list(unknown_events(written_lines)) == []
+    assert {line_problem(written_line) for written_line in (*lines, *raw(written_lines))} == {None}

@@ -19,7 +19,7 @@ from tests.store.conftest import AWKWARD
 
 
 @pytest.mark.parametrize("mended", [True, False], ids=["taken back at once", "taken back before the next line"])
-def test_after_a_full_disk_it_goes_on_where_it_was(
+def test_the_journal_continues_after_a_full_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, mended: bool
 ) -> None:
     pytest.importorskip("resource", reason="sizes of files are limited through the resource module")
@@ -52,7 +52,7 @@ class NoTruncation:
 
 
 class Disk:
-    """What ``os.fsync`` does while it is patched: remembers what is on the disk, and fails, or holds, where told to.
+    """A patched ``os.fsync`` that remembers the flushed content, and fails or blocks on request.
 
     A flush that fails loses what it was to flush, as a system does that drops the pages it could not write.
     """
@@ -89,17 +89,17 @@ class Disk:
 
 @pytest.fixture
 def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Disk:
-    made = Disk(tmp_path / "journal.jsonl")
-    monkeypatch.setattr("study_app.store.journals.journal.os.fsync", made.fsync)
-    return made
+    recorded_disk = Disk(tmp_path / "journal.jsonl")
+    monkeypatch.setattr("study_app.store.journals.journal.os.fsync", recorded_disk.fsync)
+    return recorded_disk
 
 
-def test_a_line_that_nobody_waits_for_is_flushed_behind_and_in_order(disk: Disk) -> None:
+def test_lines_appended_without_waiting_are_flushed_in_the_background_in_order(disk: Disk) -> None:
     journal = Journal.create(disk.path)
     before = disk.mine  # the folder's entry
     disk.free.clear()  # no flush ends
-    written = [journal.append(event_of("seen", count=number), waits=False) for number in range(9)]
-    assert read(disk.path) == written
+    events = [journal.append(event_of("seen", count=number), waits=False) for number in range(9)]
+    assert read(disk.path) == events
     assert disk.mine == before
     disk.free.set()
     answer = journal.append(event_of("counted", value=1))
@@ -111,14 +111,14 @@ def test_a_line_that_nobody_waits_for_is_flushed_behind_and_in_order(disk: Disk)
     assert len(disk.by) - before <= 4  # one flush is enough for all lines that wait
 
 
-def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
+def test_a_failed_background_flush_is_reported_with_the_next_line_and_loses_none(
     disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("study_app.store.journals.journal.RETRY_S", 3600.0)
     journal = Journal.create(disk.path)
     first = journal.append(event_of("counted", value=1))
     disk.fails = 2
-    shown = journal.append(event_of("seen", item="calm"), waits=False)
+    shown_event = journal.append(event_of("seen", item="calm"), waits=False)
     assert disk.failed.wait(20)
     with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(Input/output error\)"):
         journal.append(event_of("seen", item="strong"), waits=False)
@@ -130,18 +130,18 @@ def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
         journal.close()
     assert journal.is_closed
     journal.close()
-    assert read(disk.path)[:3] == [first, shown, second]
-    assert [line.n for line in (first, shown, second, third)] == [1, 2, 3, 4]
+    assert read(disk.path)[:3] == [first, shown_event, second]
+    assert [line.n for line in (first, shown_event, second, third)] == [1, 2, 3, 4]
 
 
-def test_a_flush_that_fails_in_the_background_is_told_and_repeated(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_background_flush_is_reported_and_repeated(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("study_app.store.journals.journal.RETRY_S", 0.0)
     journal = Journal.create(disk.path)
     journal.append(event_of("counted", value=1))
     journal.check_flushed()
     disk.fails = -1  # every flush fails
     disk.flushed.clear()
-    shown = journal.append(event_of("seen", item="calm"), waits=False)
+    shown_event = journal.append(event_of("seen", item="calm"), waits=False)
     for _ in range(3):
         assert disk.failed.wait(20)
         disk.failed.clear()
@@ -153,32 +153,32 @@ def test_a_flush_that_fails_in_the_background_is_told_and_repeated(disk: Disk, m
     with journal.flushing:
         journal.check_flushed()
     assert disk.content == disk.path.read_bytes()
-    assert read(disk.path)[-1] == shown
+    assert read(disk.path)[-1] == shown_event
     journal.close()
 
 
 @pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(lines=st.lists(st.tuples(st.booleans(), st.booleans()), max_size=12), cut=st.integers(0, 400))
-def test_a_power_cut_takes_no_answer_and_leaves_no_hole(
+def test_a_power_cut_loses_only_the_end_of_the_unflushed_lines(
     tmp_path_factory: pytest.TempPathFactory, lines: list[tuple[bool, bool]], cut: int
 ) -> None:
-    """Of what no flush has reached yet any part may be on the disk; flushes may fail."""
+    """Any part of the unflushed bytes may be on the disk, and flushes may fail."""
     disk = Disk(tmp_path_factory.mktemp("cut") / "journal.jsonl")
     with pytest.MonkeyPatch.context() as patched, contextlib.ExitStack() as over:
         patched.setattr("study_app.store.journals.journal.os.fsync", disk.fsync)
         journal = Journal.create(disk.path)
         over.callback(journal.close)
-        kept: list[Any] = []
+        kept_lines: list[Any] = []
         answers = 0
         for waits, fails in lines:
             disk.fails = int(fails)
             try:
-                kept.append(journal.append(event_of("counted" if waits else "seen"), waits=waits))
+                kept_lines.append(journal.append(event_of("counted" if waits else "seen"), waits=waits))
             except StoreError:
                 continue
             if waits:
-                answers = len(kept)
+                answers = len(kept_lines)
         with journal.flushing:  # no flush is under way
             content, flushed = disk.path.read_bytes(), disk.content
             disk.fails = 0
@@ -187,7 +187,7 @@ def test_a_power_cut_takes_no_answer_and_leaves_no_hole(
     disk.path.write_bytes(flushed)
     left = scan(disk.path)
     assert left.damage is None
-    assert left.lines == kept[: len(left.lines)]
+    assert left.lines == kept_lines[: len(left.lines)]
     assert len(left.lines) >= answers
 
 
@@ -207,7 +207,7 @@ while True:
 
 
 @pytest.mark.slow
-def test_what_was_acknowledged_survives_a_kill_at_any_moment(tmp_path: Path) -> None:
+def test_acknowledged_lines_survive_a_kill_at_any_moment(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
     with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True) as program:
         assert program.stdout

@@ -31,7 +31,7 @@ def rehearsal(name: str, folder: Path, participants: int, *options: str) -> list
 
 
 def killed_in_second_trial(command: list[str], path: Path) -> None:
-    """Run a command until a journal has the second trial's start, and kill it."""
+    """Run a command, and kill it once a journal contains the start of the second trial."""
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as program:
         began = time.monotonic()
         while not (path.exists() and path.read_bytes().count(b'"event":"trial_started"') == 2):
@@ -44,7 +44,7 @@ def killed_in_second_trial(command: list[str], path: Path) -> None:
         lock.unlink()  # it names a process of this computer
 
 
-def found(folder: StudyFolder) -> dict[str, tuple[str, int]]:
+def status_and_answers(folder: StudyFolder) -> dict[str, tuple[str, int]]:
     """Return status and number of answers of each participant."""
     counts: dict[str, tuple[str, int]] = {}
     for session in folder.sessions():
@@ -55,7 +55,7 @@ def found(folder: StudyFolder) -> dict[str, tuple[str, int]]:
 
 
 def main() -> None:
-    """Record, and print what was recorded."""
+    """Record studies with a released version and print their sessions."""
     to = HERE / __version__.rpartition(".")[0]
     if to.exists():
         sys.exit(f"{to} exists: results of a released version are never recorded again")
@@ -68,7 +68,7 @@ def main() -> None:
     expected = {}
     for name in ("demo", "thickness"):
         (to / f"{name}.toml").write_bytes(source_bytes(name))
-        expected[name] = found(StudyFolder(to / name))
+        expected[name] = status_and_answers(StudyFolder(to / name))
     (to / "expected.json").write_text(json.dumps(expected, indent=2) + "\n", encoding="utf-8", newline="\n")
     size = sum(path.stat().st_size for path in to.rglob("*") if path.is_file())
     print(f"{to.relative_to(HERE)}: {expected}, {size / 1e3:.0f} kB")

@@ -57,9 +57,9 @@ def test_one_block_of_intervals_among_others_gives_the_session_their_table(start
     pairs += f'design = "{design}"\nstandard = "feel_quagmire"\n' if design else 'code_prefix = "P"\n'
     text = text_of("brackish").replace('"liquids", "delays"]', '"liquids", "delays", "pairs"]', 1)
     with start(protocol=parse(f"{text}\n[blocks.pairs]\n{pairs}".encode(), "brackish.toml")) as store:
-        started = store.lines[0]
-        assert isinstance(started, SessionStarted)
-        assert (started.intervals, store.folder.table("brackish", "intervals").exists()) == (
+        start_line = store.lines[0]
+        assert isinstance(start_line, SessionStarted)
+        assert (start_line.intervals, store.folder.table("brackish", "intervals").exists()) == (
             (True, True) if design else (None, False)
         )
 
@@ -85,7 +85,7 @@ def test_the_entry_of_every_folder_that_is_created_is_flushed(
     assert results.parent not in flushed
 
 
-def test_the_receipt_holds_what_reproduces_the_session(start: Start) -> None:
+def test_the_receipt_contains_the_facts_that_reproduce_the_session(start: Start) -> None:
     store = start()
     before = receipt.read(store.folder.receipt)
     assert before["status"] == "unfinished"
@@ -116,7 +116,7 @@ def test_every_value_of_a_start_is_in_the_receipt_and_most_are_in_the_first_line
         "outlets": {"LSL": "1.16"}, "video": {"camera": "C3"},
     }  # fmt: skip
     with start(**both, **only_receipt) as store:
-        held, first = receipt.read(store.folder.receipt), store.lines[0]
+        start_receipt, first = receipt.read(store.folder.receipt), store.lines[0]
         assert isinstance(first, SessionStarted)
         assert store.folder.path.parts[-2:] == ("sub-P009", "ses-02")
         assert store.key.drawn == "seed"
@@ -129,21 +129,22 @@ def test_every_value_of_a_start_is_in_the_receipt_and_most_are_in_the_first_line
             store.folder.recordings, store.key.nonce, True,
         )  # fmt: skip
     both |= {"study": "brackish", "key_hash": store.key.hash, "protocol_hash": SOURCE_HASH, "version": __version__}
-    assert {name: held[name] for name in both} == {name: getattr(first, name) for name in both} == both
-    assert {name: held[name] for name in only_receipt} == only_receipt
-    assert (held["format"], held["status"], held["reason"], held["ended_at"], held["resumed"]) == (
+    assert {name: start_receipt[name] for name in both} == {name: getattr(first, name) for name in both} == both
+    assert {name: start_receipt[name] for name in only_receipt} == only_receipt
+    assert (start_receipt["format"], start_receipt["status"], start_receipt["reason"], start_receipt["ended_at"],
+            start_receipt["resumed"]) == (
         2, "unfinished", "", None, [],
     )  # fmt: skip
-    assert (held["started_at"], first.at, first.t_s, first.n) == (
-        held["clock"]["origin_at"],
-        held["started_at"],
+    assert (start_receipt["started_at"], first.at, first.t_s, first.n) == (
+        start_receipt["clock"]["origin_at"],
+        start_receipt["started_at"],
         0.0,
         1,
     )
     assert (first.format, first.device, first.measures_sealed) == (2, "falcon", True)
     assert (first.own_codes, first.intervals, first.entry, first.group, first.place_in_group) == (None,) * 5
     assert first.limits == protocol.limits.model_dump(mode="json")
-    assert first.receipt_hash == receipt.digest(held)
+    assert first.receipt_hash == receipt.digest(start_receipt)
 
 
 @pytest.mark.parametrize(
@@ -159,7 +160,9 @@ def test_every_value_of_a_start_is_in_the_receipt_and_most_are_in_the_first_line
         ({"participant": "P008", "protocol": OTHER}, "contains the study 'brackish', not 'other'"),
     ],
 )
-def test_a_refusal_touches_nothing(tmp_path: Path, finished: Start, again: dict[str, Any], sentence: str) -> None:
+def test_a_refusal_leaves_the_results_unchanged(
+    tmp_path: Path, finished: Start, again: dict[str, Any], sentence: str
+) -> None:
     finished()
     before = every_byte(tmp_path / "study")
     with pytest.raises(StoreError) as refusal:
@@ -178,7 +181,7 @@ def test_an_unwritable_results_folder_is_one_line(tmp_path: Path, start: Start) 
     assert names_in(tmp_path) == ["file"]
 
 
-def test_a_disk_that_fills_while_beginning_leaves_no_session(tmp_path: Path, start: Start) -> None:
+def test_a_disk_that_fills_at_the_start_leaves_no_session_folder(tmp_path: Path, start: Start) -> None:
     start("P001").finish("completed")
     before = every_byte(tmp_path / "study")
     with files_up_to(1000), pytest.raises(StoreError, match=r"receipt\.json cannot be written \(File too large\)"):
@@ -208,12 +211,14 @@ CHANGED = {
 }
 
 
-@pytest.mark.parametrize(("read_as", "participant"), [(what, one) for what, ids in CHANGED.items() for one in ids])
+@pytest.mark.parametrize(
+    ("read_as", "participant"), [(what, participant_id) for what, ids in CHANGED.items() for participant_id in ids]
+)
 def test_an_id_that_other_programs_change_is_refused(tmp_path: Path, read_as: str, participant: str) -> None:
-    with pytest.raises(StoreError) as refused:
+    with pytest.raises(StoreError) as error:
         used_ids(StudyFolder(tmp_path)).check_unused(participant, 1)
-    assert f"participant ID '{participant}' cannot be used" in str(refused.value)
-    assert f"read it as {read_as}; use another ID, such as P001" in str(refused.value)
+    assert f"participant ID '{participant}' cannot be used" in str(error.value)
+    assert f"read it as {read_as}; use another ID, such as P001" in str(error.value)
 
 
 KEPT = ("P1", "P007", "7", "101", "S01", "Anna", "NA1", "E5", "1A", "March", "TRUE1", "X0", "Marta1", "3D", "0xG")
@@ -229,13 +234,13 @@ def test_a_participant_who_has_such_an_id_already_has_further_sessions(tmp_path:
 
 
 def test_a_used_number_is_refused_with_the_next_free_number_and_id(tmp_path: Path) -> None:
-    held = frozenset({("P002", 3), ("P002", 1), ("p011", 7), ("X40", 2), ("P1x", 5)})
-    used = UsedIds(tmp_path, held, ("P002", "P050", "p011"), withdrawn=("P012",))
+    used_numbers = frozenset({("P002", 3), ("P002", 1), ("p011", 7), ("X40", 2), ("P1x", 5)})
+    used = UsedIds(tmp_path, used_numbers, ("P002", "P050", "p011"), withdrawn=("P012",))
     assert (used.numbers("P002"), used.numbers("P050"), used.suggested()) == ((1, 3), (), "P013")
     used.check_unused("P002", 2)
-    with pytest.raises(StoreError) as refused:
+    with pytest.raises(StoreError) as error:
         used.check_unused("P002", 1)
-    assert str(refused.value) == (
+    assert str(error.value) == (
         f"participant P002 already has session 1 in {tmp_path}: use a new session number (4), resume that session, or "
         "use another ID (next free: P013); nothing was changed"
     )
@@ -243,3 +248,7 @@ def test_a_used_number_is_refused_with_the_next_free_number_and_id(tmp_path: Pat
         used.check_unused("P012", 2)
     with pytest.raises(StoreError, match=r"^participant ID 'P011' differs from the existing 'p011' only in capital"):
         used.check_unused("P011", 8)
+    used.check_rehearsal(["P001", "P003"])
+    for participants, ids in ((["P001", "P002", "P003"], "IDs P001 to P003"), (["P012"], "ID P012")):
+        with pytest.raises(StoreError, match=rf"the rehearsal uses the {ids}: specify a new folder with --results, or"):
+            used.check_rehearsal(participants)

@@ -60,7 +60,7 @@ def test_a_folder_is_open_in_one_program_until_it_lets_go(tmp_path: Path) -> Non
     [{"pid": "ended"}, {"pid": os.getpid(), "began": 0.25}],
     ids=["the process has ended", "another process has its number now"],
 )
-def test_the_marker_of_a_program_that_is_gone_is_passed_over(tmp_path: Path, changes: dict[str, Any]) -> None:
+def test_the_marker_of_an_ended_program_is_ignored(tmp_path: Path, changes: dict[str, Any]) -> None:
     if changes["pid"] == "ended":
         changes = {"pid": ended_process()}
     marker = other(tmp_path, **changes)
@@ -86,7 +86,7 @@ def test_a_session_that_another_program_began_meanwhile_is_not_taken_over(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a killed program of Windows is gone at once")
-def test_a_killed_program_that_nobody_has_waited_for_is_gone(tmp_path: Path) -> None:
+def test_a_killed_program_counts_as_ended_before_it_is_reaped(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as program:
         other(tmp_path, pid=program.pid, began=process_start_s(program.pid))
         assert is_open(tmp_path)
@@ -125,19 +125,19 @@ def test_neither_a_set_clock_nor_a_hidden_process_ends_an_opening(
 
 
 @needs_links
-def test_a_marker_that_is_removed_before_it_is_read_keeps_nobody_out(tmp_path: Path) -> None:
+def test_a_marker_removed_before_it_is_read_does_not_lock_the_folder(tmp_path: Path) -> None:
     (tmp_path / ".open-0123abcd.json").symlink_to(tmp_path / "removed")
     assert not is_open(tmp_path)
 
 
 @pytest.mark.slow
 @needs_fork
-def test_of_programs_that_come_at_once_never_two_get_in(tmp_path: Path) -> None:
+def test_concurrent_programs_never_hold_the_same_folder_lock(tmp_path: Path) -> None:
     """A stale marker lies in every folder, which all want to take away."""
-    gone = ended_process()
+    ended_pid = ended_process()
     for number in range(60):
         (tmp_path / str(number)).mkdir()
-        other(tmp_path / str(number), pid=gone)
+        other(tmp_path / str(number), pid=ended_pid)
 
     @contextmanager
     def opened(_program: int, number: int) -> Iterator[bool]:
@@ -178,7 +178,7 @@ def test_the_next_free_id_is_suggested(tmp_path: Path) -> None:
     assert used_ids(folder).suggested() == "P012"
 
 
-def test_a_used_session_is_refused_with_three_ways_to_go_on(tmp_path: Path) -> None:
+def test_a_used_session_number_is_refused_with_three_remedies(tmp_path: Path) -> None:
     folder = with_sessions(tmp_path, "sub-P002/ses-01", "sub-P002/ses-02")
     with pytest.raises(StoreError) as refusal:
         used_ids(folder).check_unused("P002", 1)
@@ -205,7 +205,7 @@ def test_a_sessions_folder_is_known_from_its_path(tmp_path: Path) -> None:
     "name",
     ["rek2024/data/sub-P007", "rek2024/data/P007/ses-01", "rek2024/data/sub-P-7/ses-01", "sub-P007/ses-01", "gone"],
 )
-def test_other_folders_are_no_sessions(tmp_path: Path, name: str) -> None:
+def test_a_folder_without_a_session_is_refused(tmp_path: Path, name: str) -> None:
     if name != "gone":
         (tmp_path / name).mkdir(parents=True)
     with pytest.raises(StoreError, match="is not a session folder: specify one such as results/rek2024/data"):

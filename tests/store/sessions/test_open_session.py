@@ -36,7 +36,7 @@ def test_a_table_or_receipt_that_cannot_be_written_at_the_end_is_reported_and_th
         assert b"completed" in store.place.study_folder.participants("brackish").read_bytes()
 
 
-def test_after_its_end_a_session_takes_nothing(start: Start) -> None:
+def test_an_ended_session_refuses_events(start: Start) -> None:
     store = start()
     store.finish("completed")
     for late in (lambda: store.append(journal_events.Note(kind="note", text="late")), lambda: store.finish("aborted")):
@@ -48,7 +48,7 @@ def test_after_its_end_a_session_takes_nothing(start: Start) -> None:
         left.append(journal_events.Note(kind="note", text="late"))
 
 
-def test_a_flush_that_failed_is_told_by_the_session(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_session_reports_a_failed_flush(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     with start() as store:
         monkeypatch.setattr(store.journal, "check_flushed", mock.Mock(side_effect=StoreError("not flushed")))
         with pytest.raises(StoreError, match="not flushed"):
@@ -57,8 +57,8 @@ def test_a_flush_that_failed_is_told_by_the_session(start: Start, monkeypatch: p
 
 
 def trial_of(number: int, **changes: Any) -> dict[str, Any]:
-    told = {"block": "liquids", "phase": "main", "part": 1, "index": number, "of": 9, "code": "L1"}
-    return {"trial": number, "attempt": 1, **told, **changes}
+    fields = {"block": "liquids", "phase": "main", "part": 1, "index": number, "of": 9, "code": "L1"}
+    return {"trial": number, "attempt": 1, **fields, **changes}
 
 
 def rows_of(store: SessionStore, table: str) -> list[dict[str, str]]:

@@ -11,7 +11,7 @@ from tests.store.sessions.conftest import every_byte
 
 
 @pytest.fixture
-def ended(start: Start, attend: Attend) -> SessionStore:
+def ended_session(start: Start, attend: Attend) -> SessionStore:
     store = start()
     attend(store)
     store.append(journal_events.Note(kind="note", text='comma, "quote"\nnew line, =SUM(A1) 🌊'))
@@ -19,25 +19,25 @@ def ended(start: Start, attend: Attend) -> SessionStore:
     return store
 
 
-def test_half_written_files_are_taken_away_and_nothing_else(ended: SessionStore) -> None:
-    here, below = ended.folder.path, ended.folder.recordings
+def test_rebuilding_removes_only_half_written_files(ended_session: SessionStore) -> None:
+    here, below = ended_session.folder.path, ended_session.folder.recordings
     below.mkdir()
     half = [here / ".folder.0123abcd.tmp", here / ".trials.csv.0123abcd.tmp", below / ".trial-001.parquet.0123abcd.tmp"]
     names = ("notes.tmp", ".mine.tmp", ".open-0123abcd.bak", "..open-01234567.json.0123abcd.tmp")
-    kept = [*(here / name for name in names), below / "own.parquet"]
+    other_files = [*(here / name for name in names), below / "own.parquet"]
     half[0].mkdir()
-    for path in (half[0] / "inside", *half[1:], *kept):
+    for path in (half[0] / "inside", *half[1:], *other_files):
         path.write_bytes(b"x")
     assert rebuild_session(here).swept == tuple(half)
-    assert [path.exists() for path in (*half, *kept)] == [False] * 3 + [True] * 5
+    assert [path.exists() for path in (*half, *other_files)] == [False] * 3 + [True] * 5
 
 
 def three_answers(store: SessionStore) -> None:
-    """As short as a session with three answers can be, so that it can be cut everywhere."""
-    told = {"block": "b", "phase": "main", "part": 1, "of": 3, "code": "L1"}
+    """Journal the shortest session with three answers, so that it can be cut at every byte."""
+    fields = {"block": "b", "phase": "main", "part": 1, "of": 3, "code": "L1"}
     times = {"onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
     for number in (1, 2, 3):
-        store.append(journal_events.TrialStarted(trial=number, attempt=1, index=number, **told))
+        store.append(journal_events.TrialStarted(trial=number, attempt=1, index=number, **fields))
         store.append(event_of("trial_ended", trial=number, attempt=1, outcome="complete"))
         item = {"item": "wet", "number": 1, "value": number, **times}
         store.append(event_of("responses", trial=number, attempt=1, items=[item]))
@@ -45,8 +45,8 @@ def three_answers(store: SessionStore) -> None:
 
 @pytest.mark.nightly
 @pytest.mark.slow
-def test_of_a_journal_cut_at_any_byte_everything_whole_is_rebuilt_and_the_journal_left_alone(start: Start) -> None:
-    """The tables are those of the whole lines; the torn tail is counted; without a whole line there is nothing."""
+def test_a_journal_cut_at_any_byte_is_rebuilt_from_its_whole_lines_and_left_unchanged(start: Start) -> None:
+    """The tables contain the whole lines; the incomplete last line is counted; without lines there is no table."""
     with start() as store:
         three_answers(store)
     path = store.folder.journal
@@ -62,15 +62,15 @@ def test_of_a_journal_cut_at_any_byte_everything_whole_is_rebuilt_and_the_journa
             with pytest.raises(StoreError, match="does not begin with session_started"):
                 rebuild_session(store.folder.path)
             continue
-        done = rebuild_session(store.folder.path)
-        assert done.torn_bytes == size - ends[whole - 1]
+        rebuild = rebuild_session(store.folder.path)
+        assert rebuild.torn_bytes == size - ends[whole - 1]
         assert [(file, file.read_bytes()) for file, _ in expected[whole - 1]] == list(expected[whole - 1])
         assert path.read_bytes() == content[:size]
     assert store.folder.receipt.read_bytes() == receipt_bytes
     assert sum(table.count(b"\n") for _, table in expected[-1]) == 2 * (1 + 3)
 
 
-def test_a_session_that_is_open_is_left_alone(start: Start) -> None:
+def test_an_open_session_is_not_rebuilt(start: Start) -> None:
     with start() as store:
         before = every_byte(store.folder.path)
         with pytest.raises(StoreError, match="is open in another program"):
@@ -78,10 +78,10 @@ def test_a_session_that_is_open_is_left_alone(start: Start) -> None:
         assert every_byte(store.folder.path) == before
 
 
-def test_a_folder_under_a_tables_name_is_a_doubt(ended: SessionStore) -> None:
-    path = ended.folder.table("brackish", "trials")
+def test_a_folder_under_a_tables_name_is_a_doubt(ended_session: SessionStore) -> None:
+    path = ended_session.folder.table("brackish", "trials")
     path.unlink()
     path.mkdir()
-    (doubt,) = session_discrepancies(ended.place)
+    (doubt,) = session_discrepancies(ended_session.place)
     assert doubt.path == path
     assert "cannot be read" in str(doubt)

@@ -25,13 +25,13 @@ def with_receipt(store: SessionStore, **changes: Any) -> None:
 
 
 def without_end(store: SessionStore) -> None:
-    """Make the receipt what it is before a session ends."""
+    """Reset the receipt to its state before the end of a session."""
     fields = receipt.read(store.folder.receipt)
     del fields["reason"], fields["ended_at"]
     receipt.write(store.folder.receipt, fields | {"status": receipt.UNFINISHED})
 
 
-def test_every_derived_file_that_is_missing_or_wrong_is_written_again_and_no_other(finished: Start) -> None:
+def test_only_missing_or_wrong_derived_files_are_rewritten(finished: Start) -> None:
     store = finished()
     study, folder = store.place.study_folder, store.folder
     before = every_byte(study.path)
@@ -41,9 +41,9 @@ def test_every_derived_file_that_is_missing_or_wrong_is_written_again_and_no_oth
     trials.unlink()
     participants.write_bytes(b"x")
     without_end(store)
-    done = rebuild_session(folder.path)
-    assert done.rewritten == (trials, folder.receipt, participants, folder.checksums, folder.rebuilt)
-    assert (done.swept, done.torn_bytes) == ((), 0)
+    rebuild = rebuild_session(folder.path)
+    assert rebuild.rewritten == (trials, folder.receipt, participants, folder.checksums, folder.rebuilt)
+    assert (rebuild.swept, rebuild.torn_bytes) == ((), 0)
     assert {path: path.stat().st_ino for path in untouched} == untouched, "not even written anew"
     after = every_byte(study.path)
     noted = {path.relative_to(study.path).as_posix() for path in (folder.checksums, folder.rebuilt)}
@@ -64,21 +64,22 @@ def test_the_end_is_copied_to_the_receipt_and_the_rest_of_the_receipt_kept(finis
         assert store.folder.receipt in rebuild_session(store.folder.path).rewritten
         assert receipt.read(store.folder.receipt) == whole
     store.folder.receipt.unlink()
-    assert store.folder.receipt not in rebuild_session(store.folder.path).rewritten
+    rebuilt = rebuild_session(store.folder.path)
+    assert (store.folder.receipt in rebuilt.rewritten, rebuilt.lost) == (False, (store.folder.receipt,))
     assert not store.folder.receipt.exists(), "a missing receipt cannot be known"
 
 
 def test_a_missing_fingerprint_is_listed_again_and_noted(finished: Start) -> None:
     store = finished()
     fingerprints, folder = store.place.study_folder.fingerprints, store.folder
-    listed = fingerprints.read_bytes()
+    fingerprints_before = fingerprints.read_bytes()
     fingerprints.unlink()
     assert rebuild_session(folder.path).rewritten == (folder.checksums, folder.rebuilt, fingerprints)
     assert "did not contain the session's fingerprint" in folder.rebuilt.read_text(encoding="utf-8")
-    assert fingerprints.read_bytes().count(b"\n") == listed.count(b"\n")
+    assert fingerprints.read_bytes().count(b"\n") == fingerprints_before.count(b"\n")
 
 
-def test_of_a_session_without_an_end_neither_receipt_nor_checksums_are_touched(start: Start) -> None:
+def test_rebuilding_an_unfinished_session_keeps_its_receipt_and_writes_no_checksums(start: Start) -> None:
     with start() as store:
         store.append(journal_events.PageShown(page="consent"), t_s=40.0)
     before = store.folder.receipt.read_bytes()
@@ -98,7 +99,7 @@ def test_of_a_session_without_an_end_neither_receipt_nor_checksums_are_touched(s
         (False, r"is finished \(completed\), but its receipt, .*: run liquid-study rebuild .*ses-01 to write them$"),
     ],
 )
-def test_a_finished_session_cannot_go_on(
+def test_a_finished_session_cannot_be_resumed(
     finished: Start, again: Again, protocol: Protocol, has_checksums: bool, expected: str
 ) -> None:
     store = finished()
@@ -112,16 +113,19 @@ def test_a_finished_session_cannot_go_on(
     assert every_byte(store.folder.path) == before
 
 
-def refusal(again: Again, session: Path) -> str:
-    """What both say who would replace files; nothing changes."""
+def refusal_message(resume: Again, session: Path) -> str:
+    """Return the error message with which resuming and rebuilding both refuse to replace files.
+
+    Check that neither changes a file.
+    """
     before = every_byte(session)
-    with pytest.raises(StoreError) as resumed:
-        again()
-    with pytest.raises(StoreError) as rebuilt:
+    with pytest.raises(StoreError) as resume_error:
+        resume()
+    with pytest.raises(StoreError) as rebuild_error:
         rebuild_session(session)
-    assert str(resumed.value) == str(rebuilt.value)
+    assert str(resume_error.value) == str(rebuild_error.value)
     assert every_byte(session) == before
-    return str(rebuilt.value)
+    return str(rebuild_error.value)
 
 
 def test_files_that_say_more_than_the_journal_are_not_replaced(start: Start, again: Again) -> None:
@@ -132,23 +136,23 @@ def test_files_that_say_more_than_the_journal_are_not_replaced(start: Start, aga
     entries = receipt.read(folder.receipt)["resumed"]
     assert len(entries) == 1
     with_receipt(store, resumed=2 * entries)
-    assert refusal(again, folder.path) == (
+    assert refusal_message(again, folder.path) == (
         f"{folder.receipt} records more resumptions of the session than the journal does: {restore}"
     )
     with_receipt(store, resumed=entries, status="completed")
-    assert refusal(again, folder.path) == (
+    assert refusal_message(again, folder.path) == (
         f"{folder.receipt} has the status 'completed', but the journal 'unfinished': {restore}"
     )
     with_receipt(store, status=receipt.UNFINISHED)
     folder.checksums.write_bytes(b"")
-    assert refusal(again, folder.path) == (
+    assert refusal_message(again, folder.path) == (
         f"{folder.checksums} was written after the session ended, but the journal does not record the end: {restore}"
     )
     folder.checksums.unlink()
     rebuild_session(folder.path)
 
 
-def test_the_fingerprint_or_a_recording_of_what_never_was_is_not_passed_over(
+def test_fingerprints_and_recordings_without_a_journal_line_stop_the_rebuild(
     finished: Start, again: Again, protocol: Protocol
 ) -> None:
     store = finished()
@@ -159,7 +163,7 @@ def test_the_fingerprint_or_a_recording_of_what_never_was_is_not_passed_over(
         folder.table("brackish", name).unlink()
     without_end(store)
     place = folder.path.relative_to(study.path).as_posix()
-    assert refusal(again, folder.path).startswith(
+    assert refusal_message(again, folder.path).startswith(
         f"{study.fingerprints} lists {place} as ended, but its journal does not record the end: "
     )
     study.fingerprints.unlink()
@@ -167,7 +171,7 @@ def test_the_fingerprint_or_a_recording_of_what_never_was_is_not_passed_over(
     number = build_schedule(protocol, "P007", 11).trials[0].number
     stray = folder.recordings / f"trial-{number:03}.parquet"
     stray.write_bytes(b"x")
-    assert refusal(again, folder.path).startswith(
+    assert refusal_message(again, folder.path).startswith(
         f"{stray} belongs to a trial that never started, according to the journal: "
     )
     stray.unlink()
@@ -178,7 +182,7 @@ def test_a_line_from_a_later_version_is_left_to_that_version(start: Start, again
     with start() as store:
         store.append(journal_events.PageShown(page="consent"), t_s=40.0)
     forge(store.folder.journal, lambda lines: (lines[0].update(version="99.0"), lines[1].update(event="tide_turned")))
-    assert refusal(again, store.folder.path) == (
+    assert refusal_message(again, store.folder.path) == (
         f"{store.folder.journal} contains 'tide_turned' events, which this version does not recognise: "
         "use the version that wrote them"
     )
@@ -195,14 +199,14 @@ def test_a_recording_is_given_up_once(start: Start, again: Again, protocol: Prot
     assert journal.read(store.folder.journal)[-1].event == "session_resumed"
 
 
-def test_without_recordings_no_trial_has_lost_one(start: Start, again: Again, attend: Attend) -> None:
+def test_trials_without_recordings_are_not_reported_as_lost(start: Start, again: Again, attend: Attend) -> None:
     with start() as store:
         attend(store)
     with again() as resumed:
         assert "recording_lost" not in {line.event for line in resumed.lines}
 
 
-def changed(**study: str) -> Protocol:
+def changed_protocol(**study: str) -> Protocol:
     tables = study_tables()
     return Protocol.model_validate(tables | {"study": tables["study"] | study})
 
@@ -212,31 +216,33 @@ def with_conditions(**conditions: dict[str, Any]) -> Protocol:
     return Protocol.model_validate(tables | {"conditions": tables["conditions"] | conditions})
 
 
-def told(again: Again, protocol: Protocol) -> list[str]:
-    """The differences that are named to who resumes with another protocol file."""
+def reported_differences(again: Again, protocol: Protocol) -> list[str]:
+    """Return the differences that are reported when a session is resumed with another protocol file."""
     with pytest.raises(StoreError) as error:
         again(protocol=protocol, source=SOURCE + b"#")
-    before, _, listed = str(error.value).partition(" Differences: ")
+    before, _, differences = str(error.value).partition(" Differences: ")
     assert before.endswith(
         "ses-01 began with a different protocol file and can be resumed only with that file: restore it, "
         "or use a new session number."
     )
-    return listed.split("; ")
+    return differences.split("; ")
 
 
-def test_what_differs_from_the_file_a_session_began_with_is_told_unless_it_is_blinded(
+def test_differences_from_the_original_study_file_are_reported_except_blinded_conditions(
     start: Start, again: Again, protocol: Protocol
 ) -> None:
     start().close()
-    assert told(again, protocol) == ["only in comments, order or notation"]
-    assert told(again, with_conditions(see_tardy={"liquid": "quagmire", "delay_ms": 138})) == ["conditions differ"]
-    (title,) = told(again, changed(title="Briny"))
+    assert reported_differences(again, protocol) == ["only in comments, order or notation"]
+    assert reported_differences(again, with_conditions(see_tardy={"liquid": "quagmire", "delay_ms": 138})) == [
+        "conditions differ"
+    ]
+    (title,) = reported_differences(again, changed_protocol(title="Briny"))
     assert ("Brackish" in title, "Briny" in title) == (True, True)
     tables = study_tables()
     for number, block in enumerate(tables["blocks"].values()):
         block |= {"title": f"New {number}", "setting_label": f"Other {number}"}
     tables["study"]["title"] = "Briny"
-    many = told(again, Protocol.model_validate(tables))
+    many = reported_differences(again, Protocol.model_validate(tables))
     assert len(many) == 7
     assert many[-1] == "and 1 more"
     with again() as resumed:

@@ -27,8 +27,8 @@ from tests.store.test_recorder import Disk
 
 
 def begin_trial(store: SessionStore, trial: Trial) -> None:
-    told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
-    store.append(journal_events.TrialStarted(trial=trial.number, attempt=1, **told))
+    trial_fields = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+    store.append(journal_events.TrialStarted(trial=trial.number, attempt=1, **trial_fields))
 
 
 def present(store: SessionStore, trial: Trial, summary: dict[str, Any]) -> None:
@@ -37,7 +37,7 @@ def present(store: SessionStore, trial: Trial, summary: dict[str, Any]) -> None:
     store.write_tables()
 
 
-def test_a_session_is_left_promptly_though_the_disk_takes_no_recording_and_goes_on(
+def test_a_session_whose_recordings_cannot_be_written_closes_promptly_and_resumes(
     start: Start, again: Again, samples_of: Make, protocol: Protocol, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("study_app.store.sessions.open_session.LEAVING_S", 0.05, raising=False)
@@ -57,7 +57,7 @@ def test_a_session_is_left_promptly_though_the_disk_takes_no_recording_and_goes_
     disk.works.set()
 
 
-def test_it_goes_on_after_the_last_line_and_says_so(start: Start, again: Again) -> None:
+def test_a_resumed_session_continues_after_the_last_line_and_records_it(start: Start, again: Again) -> None:
     with start() as store:
         store.append(journal_events.PageShown(page="consent"), t_s=40.0)
     last_at = datetime.fromisoformat(store.lines[-1].at)
@@ -83,7 +83,7 @@ def test_it_goes_on_after_the_last_line_and_says_so(start: Start, again: Again) 
 
 
 @pytest.mark.parametrize(("table", "spare"), [("responses", 0), ("trials", 1), ("intervals", 1)])
-def test_a_power_cut_may_leave_a_trial_and_an_interval_more_than_the_journal_and_no_answer(
+def test_tables_may_exceed_the_journal_by_one_trial_and_interval_but_not_by_an_answer(
     start: Start, again: Again, table: str, spare: int
 ) -> None:
     with start() as store:
@@ -98,7 +98,7 @@ def test_a_power_cut_may_leave_a_trial_and_an_interval_more_than_the_journal_and
         again()
 
 
-def test_times_never_go_back_whatever_the_clocks_do(start: Start, again: Again) -> None:
+def test_times_never_go_back(start: Start, again: Again) -> None:
     """The wall clock was set back an hour, and the machine was started anew: its own clock begins at nought."""
     with start() as store:
         store.append(journal_events.PageShown(page="consent"), t_s=40.0)
@@ -111,7 +111,7 @@ def test_times_never_go_back_whatever_the_clocks_do(start: Start, again: Again) 
     assert datetime.fromisoformat(line.at) - set_back < timedelta(seconds=1)
 
 
-def test_a_gap_that_no_session_has_is_unknown_and_locks_nothing(start: Start, again: Again) -> None:
+def test_an_impossible_gap_is_recorded_as_unknown(start: Start, again: Again) -> None:
     """The wall clock was at 1970 before, or is decades ahead now; or a moment was changed."""
     with start() as store:
         store.append(journal_events.PageShown(page="consent"), t_s=40.0)
@@ -130,17 +130,17 @@ def test_a_gap_that_no_session_has_is_unknown_and_locks_nothing(start: Start, ag
         assert (resumed.lines[-2].gap_s, resumed.lines[-2].t_s < 41) == (None, True)
 
 
-def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> None:
+def test_the_receipt_records_the_equipment_of_each_resumption(start: Start, again: Again) -> None:
     with start() as store:
         before = receipt.read(store.folder.receipt)
     optional = {"motors_masked": {"by": "noise"}, "outlets": {"port": "COM3"}, "video": {"camera": "desk"}}
-    for count, told in enumerate(({"screens": {"width": 1280}}, optional), start=1):
-        with again(**told) as resumed:
+    for count, resumption_fields in enumerate(({"screens": {"width": 1280}}, optional), start=1):
+        with again(**resumption_fields) as resumed:
             assert len(receipt.read(store.folder.receipt)["resumed"]) == count
     after = receipt.read(store.folder.receipt)
     assert before["resumed"] == []
     assert {name for name in after if after[name] != before[name]} == {"resumed"}
-    assert [one["at"] for one in after["resumed"]] == [line.at for line in resumed.lines[1:]]
+    assert [resumption["at"] for resumption in after["resumed"]] == [line.at for line in resumed.lines[1:]]
     assert after["resumed"][0]["device"] == {"name": "mouse"}
     assert after["resumed"][0]["operator"] == "CD"
     assert after["resumed"][0]["screens"] == {"width": 1280}
@@ -150,9 +150,7 @@ def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> N
     assert after["resumed"][1]["clock"] == {"origin_ns": resumed.clock.origin_ns, "origin_at": resumed.clock.at(0)}
 
 
-def test_a_disk_without_space_for_the_line_changes_nothing_and_it_can_be_tried_again(
-    start: Start, again: Again
-) -> None:
+def test_resuming_on_a_full_disk_changes_no_file_and_can_be_repeated(start: Start, again: Again) -> None:
     with start() as store:
         store.append(journal_events.Note(kind="note", text="x" * 3000))
     before = store.folder.journal.read_bytes()
@@ -194,15 +192,15 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
         assert not torn.exists()
         assert not frames.exists()
         assert not table.exists()
-        told_of = [line for line in resumed.lines if line.event in ("recorded", "recording_lost")]
-        assert [(line.event, line.trial) for line in told_of] == [
+        recording_lines = [line for line in resumed.lines if line.event in ("recorded", "recording_lost")]
+        assert [(line.event, line.trial) for line in recording_lines] == [
             ("recorded", 1),
             ("recorded", 2),
             ("recording_lost", 3),
         ]
-        assert open_events(resumed.lines, resumed.key)[told_of[1].n - 1].samples_recorded == 200
-        assert len(read_samples(resumed.folder.path / told_of[1].recording, resumed.key.nonce)) == 200
-        assert told_of[2].reason == "the program ended before the recording was complete"
+        assert open_events(resumed.lines, resumed.key)[recording_lines[1].n - 1].samples_recorded == 200
+        assert len(read_samples(resumed.folder.path / recording_lines[1].recording, resumed.key.nonce)) == 200
+        assert recording_lines[2].reason == "the program ended before the recording was complete"
         recorder = resumed.recorder
         assert recorder is not None
         recorder.start(3, 2, 1000.0)

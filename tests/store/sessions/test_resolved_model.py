@@ -29,8 +29,8 @@ def protocol(tables_of_study: Tables) -> Protocol:
 
 
 @pytest.fixture
-def begun(start: Start) -> Iterator[SessionStore]:
-    """A session that has begun; a test may close it before its end."""
+def running_session(start: Start) -> Iterator[SessionStore]:
+    """A running session; a test may close it before its end."""
     with start() as store:
         yield store
 
@@ -45,53 +45,55 @@ def leave_all_out(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_resume_uses_effects_laws_and_estimator_of_the_receipt(
-    begun: SessionStore, protocol: Protocol, again: Again, monkeypatch: pytest.MonkeyPatch
+    running_session: SessionStore, protocol: Protocol, again: Again, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (chosen,) = resolve(protocol.scene_of("quagmire")).liquids
+    (liquid,) = resolve(protocol.scene_of("quagmire")).liquids
     assert protocol.liquids["quagmire"].effects == "auto"
-    assert len(chosen.effects) > 1
-    begun.close()
+    assert len(liquid.effects) > 1
+    running_session.close()
     leave_all_out(monkeypatch)
     now = protocol.model_copy(update={"scene": protocol.scene.model_copy(update={"velocity": Ewma()})})
-    assert resolve(now.scene_of("quagmire")).liquids[0].effects != chosen.effects
+    assert resolve(now.scene_of("quagmire")).liquids[0].effects != liquid.effects
     with again(protocol=protocol) as store:
         used = store.as_recorded(now)
     assert used.scene.velocity == Kalman()
-    assert used.liquids["quagmire"].effects == chosen.effects
-    assert used.liquids["quagmire"].drag == chosen.drag
-    assert resolve(used.scene_of("quagmire")).liquids[0] == chosen
+    assert used.liquids["quagmire"].effects == liquid.effects
+    assert used.liquids["quagmire"].drag == liquid.drag
+    assert resolve(used.scene_of("quagmire")).liquids[0] == liquid
     assert used.liquids["mildew"] == protocol.liquids["mildew"]
 
 
-def test_effects_cannot_be_read_in_the_receipt(begun: SessionStore) -> None:
-    begun.close()
-    held = receipt_of(begun)
-    assert held["protocol"]["scene"]["velocity"] == {"kind": "kalman"}
-    text = begun.folder.receipt.read_text("utf-8")
+def test_effects_cannot_be_read_in_the_receipt(running_session: SessionStore) -> None:
+    running_session.close()
+    session_receipt = receipt_of(running_session)
+    assert session_receipt["protocol"]["scene"]["velocity"] == {"kind": "kalman"}
+    text = running_session.folder.receipt.read_text("utf-8")
     assert "quagmire" not in text
     assert "unsteady_drag" not in text
-    assert len(held["resolved"]) % 64 == 32  # a tag, and blocks
+    assert len(session_receipt["resolved"]) % 64 == 32  # a tag, and blocks
 
 
-def test_receipts_of_earlier_versions_give_the_estimator_alone(begun: SessionStore, protocol: Protocol) -> None:
-    held = receipt_of(begun)
-    del held["resolved"]
-    held["protocol"]["scene"]["velocity"] = {"kind": "ewma", "alpha": 0.2}
-    used = recorded_protocol(protocol, held, begun.key)
+def test_receipts_of_earlier_versions_contain_only_the_estimator(
+    running_session: SessionStore, protocol: Protocol
+) -> None:
+    session_receipt = receipt_of(running_session)
+    del session_receipt["resolved"]
+    session_receipt["protocol"]["scene"]["velocity"] = {"kind": "ewma", "alpha": 0.2}
+    used = recorded_protocol(protocol, session_receipt, running_session.key)
     assert used.scene.velocity == Ewma(alpha=0.2)
     assert used.liquids == protocol.liquids
 
 
-def test_a_changed_text_or_one_of_another_session_is_refused(begun: SessionStore, protocol: Protocol) -> None:
-    held, key = receipt_of(begun), begun.key
-    text = held["resolved"]
+def test_a_changed_text_or_one_of_another_session_is_refused(running_session: SessionStore, protocol: Protocol) -> None:
+    start_receipt, key = receipt_of(running_session), running_session.key
+    text = start_receipt["resolved"]
     for other, used in (
         (("0" if text[0] != "0" else "1") + text[1:], key),
         (sealed_model(protocol, "P008", 1, key), key),
         (text, dataclasses.replace(key, nonce=bytes(32))),
     ):
         with pytest.raises(StoreError, match="“resolved” in the receipt of P007 cannot be decrypted"):
-            recorded_protocol(protocol, held | {"resolved": other}, used)
+            recorded_protocol(protocol, start_receipt | {"resolved": other}, used)
 
 
 def test_a_liquid_whose_delay_is_varied_keeps_its_effects(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,7 +103,7 @@ def test_a_liquid_whose_delay_is_varied_keeps_its_effects(start: Start, monkeypa
         ("\nlevels = [0.2, 0.4, 0.8]", "\nlevels = [60, 100]"),
     ]
     protocol = level_studies.study(*late)
-    (chosen,) = resolve(protocol.scene_of("thin")).liquids
+    (liquid,) = resolve(protocol.scene_of("thin")).liquids
     with start(protocol=protocol) as store:
         leave_all_out(monkeypatch)
-        assert store.as_recorded(protocol).liquids["thin"].effects == chosen.effects
+        assert store.as_recorded(protocol).liquids["thin"].effects == liquid.effects

@@ -28,9 +28,9 @@ def outlets() -> Collector:
 
 @pytest.fixture
 def store(start: Start, outlets: Collector) -> Iterator[SessionStore]:
-    with start() as made:
-        made.attach(outlets)
-        yield made
+    with start() as new_store:
+        new_store.attach(outlets)
+        yield new_store
 
 
 def test_markers_have_the_times_of_the_journal_on_the_servos_clock(store: SessionStore, outlets: Collector) -> None:
@@ -49,8 +49,8 @@ def test_a_marker_does_not_wait_for_the_disk_and_is_not_sent_again(
     store: SessionStore, outlets: Collector, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     full = mock.Mock(side_effect=StoreError("the disk is full"))
-    started = partial(store.append, journal_events.TrialStarted(**TRIAL), t_s=1.25)
-    for act in (started, partial(store.finish, "completed")):
+    append_start = partial(store.append, journal_events.TrialStarted(**TRIAL), t_s=1.25)
+    for act in (append_start, partial(store.finish, "completed")):
         with monkeypatch.context() as patch:
             patch.setattr(store.journal, "append", full)
             for _ in range(3):
@@ -77,7 +77,7 @@ def test_an_outlet_that_fails_is_journalled_once_and_its_last_count_is_in_the_re
     assert receipt.read(store.folder.receipt)["outlets_lost"] == outlets.lost
 
 
-def test_a_resumed_session_begins_with_its_resumption_and_outlets_of_its_own(
+def test_a_resumed_session_begins_with_its_resumption_and_its_own_outlets(
     start: Start, protocol: Protocol, outlets: Collector
 ) -> None:
     with start() as store:
@@ -93,13 +93,13 @@ def test_a_resumed_session_begins_with_its_resumption_and_outlets_of_its_own(
         assert later.events == ["session_resumed"]
         later.lost = {"Serial port": "it was unplugged"}
         again.finish("completed")
-    found = receipt.read(store.folder.receipt)
-    assert found["outlets_lost"] == {"LSL samples": "12 samples were not sent in time"}
-    assert found["resumed"][-1]["outlets_lost"] == {"Serial port": "it was unplugged"}
-    assert found["resumed"][-1]["outlets"] == {"a": {}}
+    session_receipt = receipt.read(store.folder.receipt)
+    assert session_receipt["outlets_lost"] == {"LSL samples": "12 samples were not sent in time"}
+    assert session_receipt["resumed"][-1]["outlets_lost"] == {"Serial port": "it was unplugged"}
+    assert session_receipt["resumed"][-1]["outlets"] == {"a": {}}
 
 
-def test_the_receipt_says_what_was_sent_where(start: Start) -> None:
+def test_the_receipt_records_the_outlets(start: Start) -> None:
     sent = {"Serial port": {"address": "serial:/dev/ttyUSB0", "codes": {"trial_started": 10}}}
     with start(outlets=sent) as store:
         assert json.loads(store.folder.receipt.read_text(encoding="utf-8"))["outlets"] == sent

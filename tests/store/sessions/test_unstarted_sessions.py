@@ -53,7 +53,7 @@ def study(tmp_path: Path, start: Start) -> StudyFolder:
 
 
 @pytest.fixture(params=[*KILLED_BEFORE, "the end of the first line", "anything was in the folder"])
-def left(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> StudyFolder:
+def unstarted_study(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> StudyFolder:
     """The study after a program that claimed P004 was killed before the named step."""
     if request.param in KILLED_BEFORE:
         killed(start, "P004", *KILLED_BEFORE[request.param])
@@ -65,10 +65,10 @@ def left(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> St
     return study
 
 
-def test_it_cannot_be_resumed_but_begun_where_no_program_takes_it_over(
-    left: StudyFolder, start: Start, protocol: Any
+def test_an_unstarted_session_cannot_be_resumed_but_begun_again(
+    unstarted_study: StudyFolder, start: Start, protocol: Any
 ) -> None:
-    place = left.session("P004", 1)
+    place = unstarted_study.session("P004", 1)
     for go_on in (
         lambda: reopen_store(place.path, protocol, SOURCE, operator="", device={}, screens={}),
         lambda: app.resume(place.path),
@@ -80,29 +80,29 @@ def test_it_cannot_be_resumed_but_begun_where_no_program_takes_it_over(
         with pytest.raises(StoreError, match="P004 already has session 1"):
             start("P004")
         assert sorted(place.path.iterdir()) == before
-    assert used_ids(left).suggested() == "P004"
-    used_ids(left).check_unused("P004", 1)
+    assert used_ids(unstarted_study).suggested() == "P004"
+    used_ids(unstarted_study).check_unused("P004", 1)
     with start("P004") as store:
         store.append(journal_events.PageShown(page="consent"))
-        assert used_ids(left).suggested() == "P005"
+        assert used_ids(unstarted_study).suggested() == "P005"
         store.finish("completed")
     with pytest.raises(StoreError, match="P004 already has session 1"):
         start("P004")
-    found = verify_study(left.path)
-    assert (found.errors, found.warnings) == ((), ())
+    verification = verify_study(unstarted_study.path)
+    assert (verification.errors, verification.warnings) == ((), ())
     assert (place.path / "journal.jsonl").read_text("utf-8").startswith('{"n":1,"event":"session_started"')
 
 
-def test_who_fails_after_taking_it_over_leaves_no_folder(
-    left: StudyFolder, start: Start, monkeypatch: pytest.MonkeyPatch
+def test_a_failure_after_taking_over_leaves_no_folder(
+    unstarted_study: StudyFolder, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(begin.receipt, "write", mock.Mock(side_effect=StoreError("no space")))
     with pytest.raises(StoreError, match="no space"):
         start("P004")
-    assert not left.session("P004", 1).path.parent.exists()
+    assert not unstarted_study.session("P004", 1).path.parent.exists()
 
 
-def test_what_a_program_killed_while_claiming_left_is_swept_with_the_next_claim(
+def test_files_of_a_program_killed_during_its_claim_are_removed_by_the_next_claim(
     study: StudyFolder, start: Start
 ) -> None:
     place = study.session("P004", 1).path.parent

@@ -38,9 +38,9 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def labs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return the folders of three sites, each with its own key; do not change them."""
-    root, felt = tmp_path_factory.mktemp("labs"), made_up("demo")
+    root, features = tmp_path_factory.mktemp("labs"), made_up("demo")
     return {
-        site: rehearse_answers("demo", participants=2, seed=seed, results=root / site / "demo", features=felt)
+        site: rehearse_answers("demo", participants=2, seed=seed, results=root / site / "demo", features=features)
         for seed, site in enumerate("ABC", start=1)
     }
 
@@ -68,33 +68,47 @@ def test_a_folder_that_changes_while_it_is_copied_is_refused(
     assert list(results.iterdir()) == []
 
 
+def test_a_lost_receipt_does_not_prevent_a_merge(labs: dict[str, Path], results: Path, tmp_path: Path) -> None:
+    lab = Path(shutil.copytree(labs["A"], tmp_path / "lab"))
+    session = lab / "data/sub-P001/ses-01"
+    (session / "receipt.json").unlink()
+    merged = merge_sites({"A": lab, "B": labs["B"]}, results / "pooled")
+    assert [site.sessions for site in merged.sites] == [2, 2]
+    problems = [f"{error.place}: {error.message}" for error in verify_study(merged.path).errors]
+    missing = "cannot be read (No such file or directory): restore it from a backup"
+    assert f"sites/A/data/sub-P001/ses-01/receipt.json: {missing}" in problems
+    (session / "journal.jsonl").unlink()
+    with pytest.raises(StoreError, match=r"receipt\.json cannot be read"):
+        merge_sites({"A": lab, "B": labs["B"]}, results / "again")
+
+
 def test_commands_name_an_excluded_participant_with_the_site(labs: dict[str, Path], results: Path) -> None:
     pooled = results / "pooled"
     merge_sites({"A": labs["A"], "B": labs["B"]}, pooled)
-    asked = [str(pooled), "--participant", "B-P001", "--by", "AB", "--reason", "asleep"]
+    decision = [str(pooled), "--participant", "B-P001", "--by", "AB", "--reason", "asleep"]
     for command, excluded in (("exclude", ["B-P001"]), ("include", [])):
-        done = CliRunner().invoke(commands, [command, *asked])
-        assert (done.exit_code, "B-P001, session 1" in done.output) == (0, True), done.output
+        result = CliRunner().invoke(commands, [command, *decision])
+        assert (result.exit_code, "B-P001, session 1" in result.output) == (0, True), result.output
         assert [row.participant for row in all_exclusions(pooled)] == excluded
     assert [row.participant for row in reversals(pooled / "sites" / "B")] == ["P001"]
 
 
 def test_the_proof_of_a_merged_study_has_the_sessions_of_every_site(labs: dict[str, Path], results: Path) -> None:
-    pooled, kept = results / "pooled", results / "proof.txt"
+    pooled, proof_file = results / "pooled", results / "proof.txt"
     merge_sites({"A": labs["A"], "C": labs["C"]}, pooled)
     text = proof_text(StudyFolder(pooled))
-    kept.write_text(text, encoding="utf-8", newline="\n")
+    proof_file.write_text(text, encoding="utf-8", newline="\n")
     sessions = {
         f"sites/{site}/{folder.relative_to(labs[site]).as_posix()}"
         for site in ("A", "C")
         for folder in labs[site].glob("data/sub-*/ses-*")
     }
     assert sessions <= {line.split()[1] for line in text.splitlines()}
-    assert verify_study(pooled, kept).is_sound
+    assert verify_study(pooled, proof_file).is_sound
 
     fewer = [line for line in text.splitlines(keepends=True) if min(sessions) not in line]
-    kept.write_text("".join(fewer), encoding="utf-8", newline="\n")
-    assert not verify_study(pooled, kept).is_sound
+    proof_file.write_text("".join(fewer), encoding="utf-8", newline="\n")
+    assert not verify_study(pooled, proof_file).is_sound
 
 
 def edit_receipts(lab: Path, **fields: object) -> Path:
@@ -103,7 +117,7 @@ def edit_receipts(lab: Path, **fields: object) -> Path:
     return lab
 
 
-def test_each_merge_that_is_refused_names_the_site_and_changes_nothing(
+def test_a_refused_merge_names_the_site_and_leaves_the_results_unchanged(
     labs: dict[str, Path], results: Path, tmp_path: Path
 ) -> None:
     a, b, c = (labs[site] for site in "ABC")
@@ -157,7 +171,7 @@ def test_the_list_of_sites_states_sessions_withdrawals_and_key_of_each_site(
     folders = {"A": labs["A"], "C": Path(shutil.copytree(labs["C"], tmp_path / "lab"))}
     withdraw(folders["C"], "P002", by="AK", reason="asked")
     steps: list[tuple[str, float]] = []
-    merged = merge_sites(folders, results / "pooled", lambda step, done: steps.append((step, done)))
+    merged = merge_sites(folders, results / "pooled", lambda step, step_number: steps.append((step, step_number)))
     assert steps == [("copying site A", 0.0), ("copying site C", 0.0)]
     assert read_merged(results / "pooled") == merged
     keys = {
@@ -205,20 +219,20 @@ def test_a_killed_merge_leaves_the_old_state_or_the_new_one(exists: bool, labs: 
             old = contents(to)
         code = forked(lambda count=kill_at: merge_until(count, labs["C"], to))
         merged = read_merged(to)
-        listed = () if merged is None else merged.names
-        states.append(listed)
+        site_names = () if merged is None else merged.names
+        states.append(site_names)
         if merged is not None:
             assert verify_study(to).is_sound
-        if "C" not in listed:
+        if "C" not in site_names:
             assert code == -signal.SIGKILL
-            held = {} if merged is None else contents(to)
-            assert {name: held.get(name) for name in old} == old
+            merged_files = {} if merged is None else contents(to)
+            assert {name: merged_files.get(name) for name in old} == old
             assert merge_sites({"C": labs["C"]}, to).names[-1] == "C"
         assert contents(to / "sites/C") == contents(labs["C"])
         assert [path.name for path in (to / "sites").iterdir() if path.name not in ("A", "C")] == []
         if code == 0:
             break
-    assert {"C" in listed for listed in states} == {False, True}
+    assert {"C" in names for names in states} == {False, True}
 
 
 def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[str, Path], results: Path) -> None:
@@ -231,11 +245,11 @@ def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[s
     if os.name == "posix":
         assert (pooled / "sites/A/blinding/key.sealed").stat().st_mode & 0o777 == 0o600
     shutil.rmtree(pooled / "sites/A/data/sub-P002")
-    said = "sites/A: contains only 1 of the 2 sessions that sites.json lists: restore the others from a backup"
-    assert said in list(map(str, verify_study(pooled).errors))
+    message = "sites/A: contains only 1 of the 2 sessions that sites.json lists: restore the others from a backup"
+    assert message in list(map(str, verify_study(pooled).errors))
 
 
-def test_a_withdrawal_that_reaches_an_older_copy_after_merging_is_no_error(
+def test_a_withdrawal_may_reach_an_older_copy_after_merging(
     labs: dict[str, Path], results: Path, tmp_path: Path
 ) -> None:
     """The site withdrew the participant, then a copy from before was merged, and then withdrawn from."""
@@ -246,39 +260,37 @@ def test_a_withdrawal_that_reaches_an_older_copy_after_merging_is_no_error(
     assert verify_study(pooled).is_sound
 
 
-def test_a_withdrawal_by_a_computer_with_a_slow_clock_is_no_missing_session(
-    labs: dict[str, Path], results: Path
-) -> None:
+def test_a_session_withdrawn_under_a_slow_clock_is_not_reported_missing(labs: dict[str, Path], results: Path) -> None:
     pooled = merge_sites({"A": labs["A"], "B": labs["B"]}, results / "pooled").path
     slow = datetime.now().astimezone() - timedelta(hours=1)
     withdraw(pooled / "sites/A", "P001", by="AK", reason="asked", now=slow)
     assert verify_study(pooled).is_sound
     shutil.rmtree(pooled / "sites/B/data/sub-P001")
-    said = "sites/B: contains only 1 of the 2 sessions that sites.json lists: restore the others from a backup"
-    assert said in list(map(str, verify_study(pooled).errors))
+    message = "sites/B: contains only 1 of the 2 sessions that sites.json lists: restore the others from a backup"
+    assert message in list(map(str, verify_study(pooled).errors))
 
 
 def test_a_list_of_sites_of_format_1_is_read(labs: dict[str, Path], results: Path) -> None:
     merged = merge_sites({"A": labs["A"], "B": labs["B"]}, results / "pooled")
-    held = json.loads(merged.manifest.read_text("utf-8"))
-    for site in held["sites"]:
+    content = json.loads(merged.manifest.read_text("utf-8"))
+    for site in content["sites"]:
         del site["withdrawals"]
-    merged.manifest.write_text(json.dumps(held | {"format": 1}), encoding="utf-8", newline="\n")
+    merged.manifest.write_text(json.dumps(content | {"format": 1}), encoding="utf-8", newline="\n")
     withdraw(merged.folder("A"), "P001", by="AK", reason="asked")
     assert verify_study(merged.path).is_sound
 
 
 def unfinished(session: Path) -> None:
-    """Take the end of a session away, and what follows from it."""
+    """Remove the end of a session from its journal, and the files that depend on it."""
     path = session / "journal.jsonl"
     path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
     (session / "checksums.sha256").unlink()
     receipt = json.loads((session / "receipt.json").read_text("utf-8"))
-    held = receipt | {"status": "unfinished", "reason": "", "ended_at": None}
-    (session / "receipt.json").write_text(json.dumps(held), encoding="utf-8", newline="\n")
+    unfinished_receipt = receipt | {"status": "unfinished", "reason": "", "ended_at": None}
+    (session / "receipt.json").write_text(json.dumps(unfinished_receipt), encoding="utf-8", newline="\n")
     fingerprints = session.parents[2] / "fingerprints.txt"
-    kept = [
+    kept_lines = [
         line for line in fingerprints.read_text("utf-8").splitlines(keepends=True) if session.parent.name not in line
     ]
-    fingerprints.write_text("".join(kept), encoding="utf-8", newline="\n")
+    fingerprints.write_text("".join(kept_lines), encoding="utf-8", newline="\n")
     rebuild_session(session)

@@ -30,7 +30,7 @@ from study_app.store.tables.study_files import check_study, columns_of, descript
         "| `due_ns` | a whole number [ns] | Time at which the tick was due; its lateness is time_ns - due_ns. |",
     ],
 )
-def test_a_line_says_kind_unit_range_and_meaning(line: str) -> None:
+def test_a_codebook_line_states_kind_unit_range_and_meaning(line: str) -> None:
     assert line in dictionary_markdown().splitlines()
 
 
@@ -100,8 +100,8 @@ def test_only_sessions_with_trials_of_intervals_can_be_incomplete(
     folder = StudyFolder(tmp_path)
     write_description(folder, protocol.study, intervals=intervals)
     variables = json.loads(folder.description.read_text(encoding="utf-8"))["variableMeasured"]
-    described = {variable["name"]: str(variable) for variable in variables}
-    assert ("trials_missing" in described, "incomplete" in described["status"]) == (intervals, intervals)
+    descriptions = {variable["name"]: str(variable) for variable in variables}
+    assert ("trials_missing" in descriptions, "incomplete" in descriptions["status"]) == (intervals, intervals)
     rows: list[Row] = [{TRIALS_MISSING.name: 3}] if intervals else []
     names = [column.name for column in columns_of(folder, rows)]
     assert names == [*(column.name for column in PARTICIPANTS), *(["trials_missing"] if intervals else [])]
@@ -122,7 +122,7 @@ def test_only_a_table_that_another_program_has_open_may_stay_as_it_is(
     caplog.clear()
 
 
-def test_no_study_is_begun_around_or_within_others(tmp_path: Path, protocol: Protocol) -> None:
+def test_a_study_is_not_begun_around_or_within_another(tmp_path: Path, protocol: Protocol) -> None:
     (tmp_path / "dataset_description.json").write_text(
         "{}", encoding="utf-8", newline="\n"
     )  # of a project, which may well hold results

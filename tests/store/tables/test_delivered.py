@@ -39,21 +39,21 @@ FORCE_DELAY = Stimulated("damper", "force_delay_ms", 40.0)
 
 def samples(b_nspm: float = 8.0, *, pace: float = 1.0, lasts_s: float = 4.0) -> Any:
     """Return an interval of the paced motion, its amplitude ``pace`` times the target's, through an exact damper."""
-    found = np.zeros(round(1000 * lasts_s), SAMPLE)
-    t_s = np.arange(len(found)) * 1e-3
-    found["time_ns"] = 5_000_000_000 + np.arange(len(found)) * 1_000_000
-    found["position_m"][:, 0] = pace * 0.02 * np.sin(2 * np.pi * t_s)
-    found["force_n"][:, 0] = -b_nspm * pace * 0.02 * 2 * np.pi * np.cos(2 * np.pi * t_s)
-    found["device_force_n"] = found["force_n"]
-    return found
+    recording = np.zeros(round(1000 * lasts_s), SAMPLE)
+    t_s = np.arange(len(recording)) * 1e-3
+    recording["time_ns"] = 5_000_000_000 + np.arange(len(recording)) * 1_000_000
+    recording["position_m"][:, 0] = pace * 0.02 * np.sin(2 * np.pi * t_s)
+    recording["force_n"][:, 0] = -b_nspm * pace * 0.02 * 2 * np.pi * np.cos(2 * np.pi * t_s)
+    recording["device_force_n"] = recording["force_n"]
+    return recording
 
 
 def late(delay: int, b_nspm: float = 8.0) -> Any:
     """Return the interval with a force that is sent so many ticks late."""
-    found = samples(b_nspm)
-    found["device_force_n"][delay:] = found["force_n"][: len(found) - delay]
-    found["device_force_n"][:delay] = 0
-    return found
+    recording = samples(b_nspm)
+    recording["device_force_n"][delay:] = recording["force_n"][: len(recording) - delay]
+    recording["device_force_n"][:delay] = 0
+    return recording
 
 
 def weakened(share: float, until: int | None = None) -> Any:
@@ -228,20 +228,20 @@ def error(found: Any, fade_s: float = 0.3, b_nspm: float = 8.0) -> float | None:
 
 def test_the_error_of_the_force_sent_is_its_difference_from_the_law_on_the_motion():
     assert error(samples()) == pytest.approx(0.0, abs=2e-3)
-    weak, late, counted = samples(), samples(), samples()
+    weak, late, counted_samples = samples(), samples(), samples()
     weak["device_force_n"] *= 0.9
     assert error(weak) == pytest.approx(0.1, abs=2e-3)
     late["device_force_n"] = np.roll(late["force_n"], 10, axis=0)
     assert error(late) == pytest.approx(2 * np.sin(np.pi * 0.01), rel=0.03)
-    counted["position_m"] = np.rint(counted["position_m"] / 38e-6) * 38e-6
-    assert error(counted) == pytest.approx(0.0, abs=0.01)
+    counted_samples["position_m"] = np.rint(counted_samples["position_m"] / 38e-6) * 38e-6
+    assert error(counted_samples) == pytest.approx(0.0, abs=0.01)
     quick, t_s = samples(), np.arange(4000) * 1e-3
     quick["position_m"][:, 1] = 0.002 * np.sin(2 * np.pi * 10 * t_s)
     quick["device_force_n"][:, 1] = -8.0 * 0.002 * 2 * np.pi * 10 * np.cos(2 * np.pi * 10 * t_s)
     assert error(quick) == pytest.approx(0.0, abs=0.02)  # the smoother passes it
-    counted["position_m"][1000] += 0.02
-    counted["limiters"][1000] = LIMITER_GLITCH
-    assert error(counted) == pytest.approx(0.0, abs=0.01)
+    counted_samples["position_m"][1000] += 0.02
+    counted_samples["limiters"][1000] = LIMITER_GLITCH
+    assert error(counted_samples) == pytest.approx(0.0, abs=0.01)
 
 
 def test_the_error_counts_after_the_fade_and_where_a_force_is_felt():
@@ -257,13 +257,13 @@ def test_the_error_counts_after_the_fade_and_where_a_force_is_felt():
 
 def swing(*, lag: float, assumed: int = 1, acted_s: float = 2.0, force_n: float = 2.0) -> Any:
     """Return 2 s of a swing, 12° per tick, 20 mm/s, that its force neither drives nor brakes ``lag`` ticks later."""
-    found = np.zeros(2000, SAMPLE)
-    ticks, turns = np.arange(len(found)), np.pi / 15
-    found["position_m"][:, 0] = 0.02e-3 / turns * np.sin(turns * (ticks - 0.5))
-    found["device_force_n"][:, 0] = -force_n * np.sin(turns * (ticks + lag))
-    found["delay_ticks"] = assumed
-    found["limiters"][: round(1000 * acted_s)] = LIMITER_ENERGY
-    return found
+    recording = np.zeros(2000, SAMPLE)
+    ticks, turns = np.arange(len(recording)), np.pi / 15
+    recording["position_m"][:, 0] = 0.02e-3 / turns * np.sin(turns * (ticks - 0.5))
+    recording["device_force_n"][:, 0] = -force_n * np.sin(turns * (ticks + lag))
+    recording["delay_ticks"] = assumed
+    recording["limiters"][: round(1000 * acted_s)] = LIMITER_ENERGY
+    return recording
 
 
 @pytest.mark.parametrize(
@@ -288,11 +288,11 @@ def test_a_device_is_late_if_its_force_would_have_braked_an_oscillation_that_las
 
 
 def test_slow_motion_and_rejected_positions_do_not_make_a_device_late() -> None:
-    found = swing(lag=2.5)
-    found["device_force_n"] += 5.0
-    found["position_m"][:, 1] = 0.1 * np.sin(2 * np.pi * 1e-3 * np.arange(len(found)))
-    found["position_m"][700], found["limiters"][700] = 1.0, LIMITER_GLITCH
-    assert late_device_ticks(found, 1000.0) == 3
+    samples_of_swing = swing(lag=2.5)
+    samples_of_swing["device_force_n"] += 5.0
+    samples_of_swing["position_m"][:, 1] = 0.1 * np.sin(2 * np.pi * 1e-3 * np.arange(len(samples_of_swing)))
+    samples_of_swing["position_m"][700], samples_of_swing["limiters"][700] = 1.0, LIMITER_GLITCH
+    assert late_device_ticks(samples_of_swing, 1000.0) == 3
 
 
 def test_a_sentence_names_both_delays() -> None:
@@ -321,14 +321,12 @@ def test_limits_are_named_as_in_the_study_once_and_only_if_it_states_them() -> N
 
 
 @pytest.mark.parametrize(("acted", "expected"), [(99, None), (100, 3)])
-def test_a_controller_that_acted_for_a_tenth_of_a_second_tells_of_a_late_device(
-    acted: int, expected: int | None
-) -> None:
+def test_a_controller_active_for_a_tenth_of_a_second_indicates_a_late_device(acted: int, expected: int | None) -> None:
     """At 1000 ticks per second; the limiters of the first sample belong to no step of the hand."""
-    found = swing(lag=2.5, acted_s=0, force_n=20.0)
-    found["limiters"][1 : acted + 1] = LIMITER_ENERGY
-    assert late_device_ticks(found, 1000.0) == expected
+    samples_of_swing = swing(lag=2.5, acted_s=0, force_n=20.0)
+    samples_of_swing["limiters"][1 : acted + 1] = LIMITER_ENERGY
+    assert late_device_ticks(samples_of_swing, 1000.0) == expected
 
 
-def test_no_delay_longer_than_eight_ticks_is_told() -> None:
+def test_delays_longer_than_eight_ticks_are_unknown() -> None:
     assert [late_device_ticks(swing(lag=lag), 1000.0) for lag in (6.5, 7.5, 8.5)] == [7, 8, None]

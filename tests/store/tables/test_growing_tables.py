@@ -20,8 +20,8 @@ NOTES = ("first, of two lines\nand a comma", "=1+2", '"quoted"')
 
 
 def start_trial(store: SessionStore, number: int, attempt: int = 1) -> None:
-    told = {"block": "b", "phase": "main", "part": 1, "index": number, "of": PAGES, "code": "L1"}
-    store.append(journal_events.TrialStarted(trial=number, attempt=attempt, **told), waits=False)
+    fields = {"block": "b", "phase": "main", "part": 1, "index": number, "of": PAGES, "code": "L1"}
+    store.append(journal_events.TrialStarted(trial=number, attempt=attempt, **fields), waits=False)
 
 
 def end_trial(store: SessionStore, number: int, summary: dict[str, Any], attempt: int = 1) -> None:
@@ -29,13 +29,15 @@ def end_trial(store: SessionStore, number: int, summary: dict[str, Any], attempt
 
 
 def answer(store: SessionStore, number: int, attempt: int = 1) -> None:
-    told = {"number": 1, "value": 4, "onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
+    answer_fields = {"number": 1, "value": 4, "onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
     store.append(journal_events.ItemShown(trial=number, item="wet"), t_s=1.5, waits=False)
     store.append(journal_events.Choice(trial=number, item="wet", value=4), t_s=2.25, waits=False)
-    store.append(event_of("responses", trial=number, attempt=attempt, items=[{"item": "wet", **told}]), waits=False)
+    store.append(
+        event_of("responses", trial=number, attempt=attempt, items=[{"item": "wet", **answer_fields}]), waits=False
+    )
 
 
-def recorded(store: SessionStore, number: int, attempt: int = 1) -> None:
+def record_trial(store: SessionStore, number: int, attempt: int = 1) -> None:
     names = {
         "recording": f"recordings/trial-{number:03d}.parquet",
         "recording_frames": f"recordings/trial-{number:03d}_frames.parquet",
@@ -46,13 +48,13 @@ def recorded(store: SessionStore, number: int, attempt: int = 1) -> None:
 
 
 def pages(store: SessionStore, summary: dict[str, Any]) -> list[Callable[[], None]]:
-    """Return what happens between the writings of tables: everything that changes a row, late and early ones too."""
+    """Return the events between two writes of the tables: every change of a row, also late and early ones."""
     return [
         lambda: start_trial(store, 1),
         lambda: end_trial(store, 1, summary),
         lambda: answer(store, 1),
         lambda: start_trial(store, 2),
-        lambda: recorded(store, 1),
+        lambda: record_trial(store, 1),
         lambda: store.append(journal_events.Note(kind="mark", text=NOTES[0])),
         lambda: None,
         lambda: store.append(journal_events.Note(kind="note", text=NOTES[1])),
@@ -61,11 +63,11 @@ def pages(store: SessionStore, summary: dict[str, Any]) -> list[Callable[[], Non
         lambda: end_trial(store, 2, summary, 2),
         lambda: answer(store, 2, 2),
         lambda: start_trial(store, 3),
-        lambda: recorded(store, 2, 2),
+        lambda: record_trial(store, 2, 2),
     ]
 
 
-def test_after_every_page_the_tables_are_what_the_journal_gives(start: Start, summary: dict[str, Any]) -> None:
+def test_the_tables_match_the_journal_after_every_page(start: Start, summary: dict[str, Any]) -> None:
     with start() as store:
         for page in pages(store, summary):
             page()
@@ -120,9 +122,9 @@ def test_a_table_that_was_cut_off_is_accepted_and_completed(
         whole = path.read_bytes()
     for size in range(whole.index(b"\n") + 1, len(whole), 7):
         path.write_bytes(whole[:size])
-        found = verify_study(store.place.study_folder.path)
-        assert found.errors == ()
-        assert any("differs from the journal" in one.message for one in found.warnings)
+        verification = verify_study(store.place.study_folder.path)
+        assert verification.errors == ()
+        assert any("differs from the journal" in warning.message for warning in verification.warnings)
         check_resumable(store.folder.path, protocol, SOURCE)
         assert path in rebuild_session(store.folder.path).rewritten
         assert path.read_bytes() == whole

@@ -57,7 +57,7 @@ def about_a_trial_that_never_started(lines: list[dict[str, Any]]) -> None:
 @pytest.mark.parametrize(
     "damage", [without_field("pilot"), without_field("participant"), beginning_late, about_a_trial_that_never_started]
 )
-def test_a_journal_that_gives_no_row_stops_no_other_session_and_is_marked(
+def test_a_journal_without_a_row_is_marked_and_does_not_stop_other_sessions(
     tmp_path: Path, start: Start, damage: Callable[[list[dict[str, Any]]], None], finished: Start
 ) -> None:
     store = finished("P001")
@@ -92,7 +92,7 @@ LINKS = [pytest.param(turn, marks=needs_links) for turn in (into_a_link_to_itsel
 
 @pytest.mark.parametrize("name", ["journal.jsonl", "checksums.sha256", "receipt.json"])
 @pytest.mark.parametrize("turn", [into_a_folder, *LINKS])
-def test_a_file_that_cannot_be_read_hides_no_session_and_stops_none(
+def test_an_unreadable_file_neither_hides_nor_stops_a_session(
     tmp_path: Path, start: Start, turn: Callable[[Path], None], name: str, finished: Start
 ) -> None:
     store = finished("P001")
@@ -100,7 +100,7 @@ def test_a_file_that_cannot_be_read_hides_no_session_and_stops_none(
     start("P002").finish("completed")
     there = "damaged" if name == "journal.jsonl" else "completed"
     assert [row["status"] for row in table(tmp_path / "study")] == [there, "completed"]
-    assert [one.participant for one in sessions(tmp_path, {})] == ["P001", "P002"]
+    assert [session.participant for session in sessions(tmp_path, {})] == ["P001", "P002"]
     findings = verify_study(tmp_path / "study")
     assert findings.sessions == 2
     assert any("P001/ses-01" in str(error) and name in str(error) for error in findings.errors)
@@ -112,7 +112,7 @@ class Killed(BaseException):
 
 
 @pytest.mark.parametrize("killed", [False, True])
-def test_of_two_programs_the_last_to_write_has_seen_both_or_the_table_heals(
+def test_the_participants_table_lists_the_sessions_of_two_concurrent_programs(
     tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, killed: bool
 ) -> None:
     """While P001's program is between reading the journals and writing the table, P002's session ends and writes."""
@@ -144,10 +144,10 @@ def test_a_journal_is_read_again_only_where_it_changed(
     for name in ("P001", "P002", "P003"):
         finished(name)
     study = StudyFolder(tmp_path / "study")
-    scan, read = journal.scan, []
-    monkeypatch.setattr(journal, "scan", lambda file: (read.append(file.parts[-3]), scan(file))[1])
+    scan, scanned_paths = journal.scan, []
+    monkeypatch.setattr(journal, "scan", lambda file: (scanned_paths.append(file.parts[-3]), scan(file))[1])
     start("P004").finish("withdrawn")
-    assert set(read) == {"sub-P004"}
+    assert set(scanned_paths) == {"sub-P004"}
     path = study.participants("brackish")
     whole = path.read_bytes()
     for content in (whole[:-40], whole.replace(b"completed", b"damaged", 1), b""):

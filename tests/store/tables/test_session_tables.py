@@ -32,24 +32,24 @@ TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
 
 @pytest.mark.slow
 @given(texts=st.lists(st.tuples(st.text(st.characters(codec="utf-8")), st.text(st.characters(codec="utf-8")))))
-def test_any_text_comes_back_through_the_csv_module(texts: list[tuple[str, str]]) -> None:
+def test_any_text_survives_the_csv_module(texts: list[tuple[str, str]]) -> None:
     content = csv_bytes(TEXT, [{"first": first, "second": second} for first, second in texts])
     read_back = list(csv.reader(io.StringIO(content.decode("utf-8"), newline="")))
     assert read_back == [
         ["first", "second"],
         *([guard_formula(first), guard_formula(second)] for first, second in texts),
     ]
-    kept = [
+    rows_kept = [
         {name: None if text == MISSING else text for name, text in zip(header(TEXT), row, strict=True)} for row in texts
     ]
-    assert read_table(content, TEXT) == kept
+    assert read_table(content, TEXT) == rows_kept
 
 
 @pytest.mark.parametrize(
     ("value", "cell"),
     [(None, "n/a"), (math.nan, "n/a"), (-math.inf, "n/a"), (True, "true"), (False, "false"), (7, "7")],
 )
-def test_what_is_not_known_or_not_a_text_has_one_spelling(value: Any, cell: str) -> None:
+def test_unknown_and_non_text_values_have_one_spelling(value: Any, cell: str) -> None:
     assert csv_bytes(TEXT[:1], [{"first": value}]) == f"first\n{cell}\n".encode()
 
 
@@ -64,7 +64,7 @@ def test_rows_that_are_shorter_than_the_head_are_a_problem() -> None:
     assert list(table_problems(b"first,second\n1\n2\n", TEXT)) == ["row 2 has 1 cells, not 2"]
 
 
-def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str, Any]) -> None:
+def test_every_column_of_trials_reads_back_as_written(summary: dict[str, Any]) -> None:
     script = Lines()
     script.started(1)
     script.ended(1, **summary)
@@ -78,12 +78,12 @@ def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str
     ]
 
 
-def test_the_row_of_an_answer_says_what_was_chosen_and_when() -> None:
+def test_the_row_of_an_answer_contains_the_choice_and_its_times() -> None:
     script, times = Lines(), {"onset_s": 1.0, "first_s": 2.0, "last_s": 4.0, "changes": 3}
     script.started(1)
     script.ended(1)
-    given: dict[str, Any] = {"scale": 5, "unsure": None, "words": "thick", "several": ["a", "b"], "part": 0.5}
-    items = [{"item": item, "number": n, "value": value, **times} for n, (item, value) in enumerate(given.items(), 1)]
+    answers: dict[str, Any] = {"scale": 5, "unsure": None, "words": "thick", "several": ["a", "b"], "part": 0.5}
+    items = [{"item": item, "number": n, "value": value, **times} for n, (item, value) in enumerate(answers.items(), 1)]
     script.line("responses", trial=1, attempt=1, items=[*items, {"item": "left", "number": 6, "value": None}])
     columns = ("item", "response", "value", "cannot_judge", "onset_s", "first_choice_s", "last_change_s", "changes")
     rows = SessionRows(script._lines).responses
@@ -106,7 +106,7 @@ def test_a_line_of_a_trial_that_never_started_is_named() -> None:
         SessionRows(script._lines)
 
 
-def test_a_table_that_was_written_before_texts_were_guarded_is_what_the_journal_gives() -> None:
+def test_a_table_written_before_texts_were_guarded_matches_the_journal() -> None:
     now = csv_bytes(TEXT, [{"first": "=1+2", "second": 'a, "b"'}, {"first": "'", "second": "+"}])
     early = now.replace(b"'=", b"=").replace(b"'+", b"+")
     assert early != now
@@ -122,7 +122,7 @@ _COMBINED = {column.name: column.of_trial for column in TRIALS if column.name in
 def test_a_trial_of_intervals_has_the_sum_mean_or_largest_value_of_its_own_intervals() -> None:
     """Two trials of two intervals and a trial that is presented again: all measured values differ."""
     script, values = Lines(intervals=True), iter(range(1, 9999))
-    told: dict[tuple[int, int], list[dict[str, float]]] = {}
+    measured: dict[tuple[int, int], list[dict[str, float]]] = {}
     for trial, attempt, arrangement in ((1, 1, "SC"), (2, 1, "CS"), (2, 2, "CS")):
         which = {"trial": trial, "attempt": attempt}
         place = {"block": "b", "phase": "main", "part": 1, "index": trial, "of": 2, "code": f"L{trial}"}
@@ -133,14 +133,15 @@ def test_a_trial_of_intervals_has_the_sum_mean_or_largest_value_of_its_own_inter
         for interval in (1, 2):
             at_s = 100.0 * trial + 30 * attempt + 7 * interval
             script.line("interval_started", t_s=at_s, **which, interval=interval)
-            told.setdefault((trial, attempt), []).append({name: next(values) + 0.25 for name in _COMBINED})
+            measured.setdefault((trial, attempt), []).append({name: next(values) + 0.25 for name in _COMBINED})
             script.line(
                 "interval_ended", t_s=at_s + interval, **which, interval=interval, outcome="complete",
-                invalid=["level_error_percent"] if (trial, interval) == (2, 2) else None, **told[trial, attempt][-1],
+                invalid=["level_error_percent"] if (trial, interval) == (2, 2) else None,
+                **measured[trial, attempt][-1],
             )  # fmt: skip
         script.line("trial_ended", t_s=at_s + 5, **which, outcome="complete")
     rows = SessionRows(script._lines)
-    for trial_row, (which, of_intervals) in zip(rows.trials, told.items(), strict=True):
+    for trial_row, (which, of_intervals) in zip(rows.trials, measured.items(), strict=True):
         assert (trial_row["trial"], trial_row["attempt"], trial_row["intervals"]) == (*which, 2)
         for name in _COMBINED:
             pair = [row[name] for row in of_intervals]
@@ -161,7 +162,7 @@ def test_a_trial_of_intervals_has_the_sum_mean_or_largest_value_of_its_own_inter
     assert [row["attempt"] for row in latest_attempts(rows.trials)] == [1, 2]
 
 
-def test_notes_of_a_reconnected_device_stand_beside_the_trials_before_and_after() -> None:
+def test_notes_of_a_reconnected_device_are_beside_the_trials_before_and_after() -> None:
     script = Lines()
     script.started(1)
     script.line("broke", what="the cable")
@@ -185,8 +186,8 @@ def test_a_damaged_session_keeps_its_row_from_its_receipt_or_its_first_line(tmp_
     session = SessionFolder(tmp_path / "ses-03", "P007", 3)
     session.path.mkdir()
     at = "2026-03-02T09:30:00+01:00"
-    held = {"key_hash": "a" * 64, "study": "stirring", "simulated": True, "pilot": False, "language": "nl"}
-    session.receipt.write_text(json.dumps(held | {"started_at": at, "device": {"name": "falcon"}}), "utf-8")
+    fields = {"key_hash": "a" * 64, "study": "stirring", "simulated": True, "pilot": False, "language": "nl"}
+    session.receipt.write_text(json.dumps(fields | {"started_at": at, "device": {"name": "falcon"}}), "utf-8")
     session.journal.write_bytes(b"damaged\n")
     (row,) = row_of(session, None)
     assert {name: value for name, value in row.items() if value is not None} == {

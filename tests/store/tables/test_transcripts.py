@@ -19,12 +19,12 @@ PROGRESS = ("step", "page", "trial", "attempt", "task_done", "answers", "unconfi
 
 
 class Lines:
-    """A journal in the making: every method without an underscore is a line, or yields what is made of all lines."""
+    """A growing journal: each public method adds a line or yields the tables of all lines."""
 
     def __init__(self, **session: Any) -> None:
         self._lines: list[Event] = []
-        told = {"study": "brackish", "participant": "P007", "session": 1, "simulated": False, "pilot": False}
-        self.line("session_started", **(told | {"language": "en", "device": "mouse", "seed": 11} | session))
+        begin_fields = {"study": "brackish", "participant": "P007", "session": 1, "simulated": False, "pilot": False}
+        self.line("session_started", **(begin_fields | {"language": "en", "device": "mouse", "seed": 11} | session))
 
     def line(self, event: str, t_s: float | None = None, **fields: Any) -> None:
         n = len(self._lines) + 1
@@ -42,8 +42,8 @@ class Lines:
         self.line("page_left", page=page)
 
     def started(self, trial: int, attempt: int = 1, phase: str = "main") -> None:
-        told = {"block": "liquids", "phase": phase, "part": 1, "index": trial, "of": 3, "code": f"L{trial}"}
-        self.line("trial_started", trial=trial, attempt=attempt, **told)
+        trial_fields = {"block": "liquids", "phase": phase, "part": 1, "index": trial, "of": 3, "code": f"L{trial}"}
+        self.line("trial_started", trial=trial, attempt=attempt, **trial_fields)
 
     def ended(self, trial: int, attempt: int = 1, outcome: str = "complete", **summary: Any) -> None:
         self.line("trial_ended", trial=trial, attempt=attempt, outcome=outcome, **summary)
@@ -55,27 +55,33 @@ class Lines:
         self.line("choice", at_s, trial=1, item=item, value=value)
 
     def answered(self, trial: int, *values: int | None, attempt: int = 1) -> None:
-        told = {"onset_s": 1.0, "first_s": 2.0, "last_s": 3.0, "changes": 1}
-        items = [{"item": f"i{n}", "number": n, "value": value, **told} for n, value in enumerate(values, start=1)]
+        answer_fields = {"onset_s": 1.0, "first_s": 2.0, "last_s": 3.0, "changes": 1}
+        items = [
+            {"item": f"i{n}", "number": n, "value": value, **answer_fields} for n, value in enumerate(values, start=1)
+        ]
         self.line("responses", trial=trial, attempt=attempt, items=items)
 
     def note(self, kind: str, text: str) -> None:
         self.line("note", kind=kind, text=text)
 
     def rows(self) -> Iterator[str]:
-        made = SessionRows(self._lines)
-        for name, table in (("trial", made.trials), ("interval", made.intervals), ("response", made.responses)):
+        session_rows = SessionRows(self._lines)
+        for name, table in (
+            ("trial", session_rows.trials),
+            ("interval", session_rows.intervals),
+            ("response", session_rows.responses),
+        ):
             for row in table:
-                told = {column: value for column, value in row.items() if value is not None and column not in OF_ALL}
-                yield f"{name} {told}"
+                cells = {column: value for column, value in row.items() if value is not None and column not in OF_ALL}
+                yield f"{name} {cells}"
 
     def person(self) -> Iterator[str]:
         yield str({column: value for column, value in participant_row(self._lines).items() if value is not None})
 
     def progress(self) -> Iterator[str]:
-        found = progress_of(self._lines)
-        told = {name: getattr(found, name) for name in PROGRESS}
-        yield ", ".join(f"{name} {value}" for name, value in told.items() if value)
+        progress_now = progress_of(self._lines)
+        fields = {name: getattr(progress_now, name) for name in PROGRESS}
+        yield ", ".join(f"{name} {value}" for name, value in fields.items() if value)
 
 
 def begun(start: str) -> Lines:
@@ -84,5 +90,5 @@ def begun(start: str) -> Lines:
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_what_is_made_of_lines(file: Path, pytestconfig: pytest.Config) -> None:
+def test_rows_and_progress_of_journal_lines_are_as_recorded(file: Path, pytestconfig: pytest.Config) -> None:
     compare(file, played(file, acts(begun, {})), pytestconfig)

@@ -62,14 +62,14 @@ def warned(found: Findings) -> str:
 
 
 def recorded(folder: Path) -> Path:
-    """Hold two sessions: P007 with recordings, one trial of it presented twice; P008 withdrawn."""
+    """Run two sessions: P007 with recordings and one repeated trial, and P008, who withdrew."""
     store = begun(folder, recordings=True)
     recorder = store.recorder
     assert recorder is not None
     for trial in build_schedule(Protocol.model_validate(study_tables()), "P007", 11).trials:
-        told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        trial_fields = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
         for attempt in (1, 2) if trial.number == 2 else (1,):
-            store.append(journal_events.TrialStarted(trial=trial.number, attempt=attempt, **told))
+            store.append(journal_events.TrialStarted(trial=trial.number, attempt=attempt, **trial_fields))
             recorder.start(trial.number, attempt, 1000.0)
             recorder.append(made_samples(500 + trial.number))
             recorder.frame(9, 4)
@@ -100,7 +100,7 @@ def answered(folder: Path) -> Path:
 
 
 def left(folder: Path) -> Path:
-    """Hold a session of P007 with all answers that has no end, after one of P008 that has."""
+    """Run a complete session of P008, then one of P007 with all answers but without an end."""
     begun(folder, "P008").finish("completed")
     with begun(folder) as store:
         attended(store)
@@ -117,11 +117,13 @@ def proved(folder: Path) -> Path:
     return study
 
 
-STARTS: dict[str, Callable[[Path], Path]] = {one.__name__: one for one in (recorded, answered, left, proved)}
+STARTS: dict[str, Callable[[Path], Path]] = {
+    function.__name__: function for function in (recorded, answered, left, proved)
+}
 
 
 def _changed(changes: dict[str, Any]) -> Protocol:
-    """Return the study with other values; a name's parts are joined by two underscores."""
+    """Return the study with other values; two underscores in a name separate nested keys."""
     tables: dict[str, Any] = study_tables()
     for name, value in changes.items():
         *above, last = name.split("__")
@@ -137,8 +139,10 @@ class Changed(Files):
 
     def __init__(self, made: Path, folder: Path) -> None:
         self.study = Path(shutil.copytree(made, folder / "study"))
-        kept = made.parent / "kept.txt"
-        self.kept = Path(shutil.copy(kept if kept.exists() else made / "fingerprints.txt", folder / "kept.txt"))
+        kept_proofs = made.parent / "kept.txt"
+        self.kept = Path(
+            shutil.copy(kept_proofs if kept_proofs.exists() else made / "fingerprints.txt", folder / "kept.txt")
+        )
         self.session = P007
         super().__init__(self.study)
 
@@ -151,25 +155,26 @@ class Changed(Files):
         return self.study / self.session / "journal.jsonl"
 
     def verify(self, *, kept: bool = False) -> Iterator[str]:
-        """Tell what is found, with fingerprints that were kept elsewhere if that is asked for."""
-        found = verify_study(self.study, self.kept if kept else None)
-        yield f"{found.sessions} sessions, {found.running} running: {'sound' if found.is_sound else 'not sound'}"
-        yield from (f"error: {one}" for one in found.errors)
-        yield from (f"warning: {one}" for one in found.warnings)
+        """Yield the findings of the verification, optionally with a separate copy of the fingerprints."""
+        verification = verify_study(self.study, self.kept if kept else None)
+        soundness = "sound" if verification.is_sound else "not sound"
+        yield f"{verification.sessions} sessions, {verification.running} running: {soundness}"
+        yield from (f"error: {error}" for error in verification.errors)
+        yield from (f"warning: {warning}" for warning in verification.warnings)
 
     def rebuild(self, session: str = P007) -> Iterator[str]:
-        done = rebuild_session(self.study / session)
-        yield f"rebuilt {[path.name for path in done.rewritten]}, torn {done.torn_bytes}"
+        rebuilt = rebuild_session(self.study / session)
+        yield f"rebuilt {[path.name for path in rebuilt.rewritten]}, torn {rebuilt.torn_bytes}"
 
     def go_on(self, comment: bytes = b"", **changes: Any) -> Iterator[str]:
-        """Look whether the session can go on, with a study of other values."""
+        """Check whether the session can be resumed with a study of other values."""
         check_resumable(self.study / P007, _changed(changes), SOURCE + comment)
         yield "it can go on"
 
     def reopen(self, comment: bytes = b"", **changes: Any) -> Iterator[str]:
-        """Let it go on, and leave it; yield what that adds to the journal."""
-        given: dict[str, Any] = {"operator": "CD", "device": {"name": "mouse"}, "screens": {}}
-        with reopen_store(self.study / P007, _changed(changes), SOURCE + comment, **given) as store:
+        """Resume the session and leave it; yield the added journal lines."""
+        choices: dict[str, Any] = {"operator": "CD", "device": {"name": "mouse"}, "screens": {}}
+        with reopen_store(self.study / P007, _changed(changes), SOURCE + comment, **choices) as store:
             yield from (f"{line.event} {getattr(line, 'torn_bytes', '')}" for line in store.lines[-1:])
 
     def open(self) -> None:
@@ -177,23 +182,23 @@ class Changed(Files):
         self.opening = lock_folder(self.study / self.session)
 
     def key_for(self, **changes: Any) -> Iterator[str]:
-        """Ask for the study's key with a study of other values, as a session that begins does."""
+        """Request the study's key with a study of other values, like a starting session."""
         for ask in (blinding.open_or_draw_key, blinding.check_conditions):
             ask(self.study, _changed(changes))
         yield "the key is this study's"
 
     def swap_codes(self, block: str) -> None:
-        """Let two codes of a block stand for each other's conditions."""
+        """Exchange the conditions of two codes of a block."""
         content = json.loads(base64.b64decode((self.study / NAMES["KEY"]).read_bytes()))
-        (one, first), (two, second) = content["codes"][block].items()
-        content["codes"][block] = {one: second, two: first}
+        (first_code, first), (second_code, second) = content["codes"][block].items()
+        content["codes"][block] = {first_code: second, second_code: first}
         self.write(NAMES["KEY"], base64.encodebytes(json.dumps(content).encode()))
 
     def begin(self, participant: str) -> None:
         begun(self.study, participant).finish("completed")
 
     def unblind(self) -> Iterator[str]:
-        yield from (f"left: {one}" for one in unblind(self.study, "AB", "done").left)
+        yield from (f"left: {file}" for file in unblind(self.study, "AB", "done").left)
 
     def exclude(self, participant: str, trial: int | None = None, reason: str = "the phone rang") -> None:
         exclude(self.study, participant, 1, trial=trial, by="AB", reason=reason)
@@ -211,8 +216,8 @@ class Changed(Files):
         blinding.reveal(self.study, by, reason)
 
     def reveals(self) -> Iterator[str]:
-        """Tell who opened the key, and why."""
-        yield from (f"{one['by']}: {one['reason']}" for one in blinding.reveals(self.study))
+        """Yield who opened the key and why."""
+        yield from (f"{reveal['by']}: {reveal['reason']}" for reveal in blinding.reveals(self.study))
 
     def seal_changed(self) -> None:
         """Change a digit of a sealed text."""
@@ -236,17 +241,17 @@ class Changed(Files):
 
     def only(self, *names: str) -> None:
         """Leave the journal, the receipt and these files of the session."""
-        kept = {self.study / name for name in (NAMES["JOURNAL"], NAMES["RECEIPT"])}
-        kept |= {path for name in names for path in (self.study / P007).glob(name)}
+        kept_files = {self.study / name for name in (NAMES["JOURNAL"], NAMES["RECEIPT"])}
+        kept_files |= {path for name in names for path in (self.study / P007).glob(name)}
         for path in (self.study / P007).rglob("*"):
-            if path.is_file() and path not in kept:
+            if path.is_file() and path not in kept_files:
                 path.unlink()
 
     def receipt(self, *gone: str, **changes: Any) -> None:
         """Change fields of the receipt, or take some away."""
         path = self.study / self.session / "receipt.json"
-        held = receipt.read(path) | changes
-        receipt.write(path, {name: value for name, value in held.items() if name not in gone})
+        session_receipt = receipt.read(path) | changes
+        receipt.write(path, {name: value for name, value in session_receipt.items() if name not in gone})
 
     def never_ended(self) -> None:
         """Remove everything that shows that the session ended, but for its tables."""
@@ -254,7 +259,7 @@ class Changed(Files):
         self.delete(NAMES["SUMS"], "fingerprints.txt")
 
     def edit(self, event: str, at: int = 0, /, **fields: Any) -> None:
-        """Change a line of the journal as one who makes all that follows right."""
+        """Change a line of the journal and repair everything that depends on it."""
 
         def change(lines: Lines) -> None:
             [line for line in lines if line["event"] == event][at].update(fields)
@@ -266,26 +271,26 @@ class Changed(Files):
         forge(self.journal, lambda lines: [line.update(at=at) for line in lines[1:]])
 
     def exchange(self, other: str) -> None:
-        """Give each of two participants the answers of the other."""
+        """Exchange the answers of two participants."""
         paths = self.journal, self.study / other / "journal.jsonl"
-        held = [[json.loads(line) for line in path.read_text("utf-8").splitlines()] for path in paths]
-        values = [[line["value"] for line in lines if line["event"] == "choice"] for lines in held]
+        content = [[json.loads(line) for line in path.read_text("utf-8").splitlines()] for path in paths]
+        values = [[line["value"] for line in lines if line["event"] == "choice"] for lines in content]
 
         def give(lines: Lines, told: list[int]) -> None:
-            rest, given = iter(told), {}
+            rest, fields = iter(told), {}
             for line in lines:
                 if line["event"] == "choice":
-                    line["value"] = given[line["trial"], line["item"]] = next(rest)
+                    line["value"] = fields[line["trial"], line["item"]] = next(rest)
                 for item in line["items"] if line["event"] == "responses" else ():
-                    item["value"] = given[line["trial"], item["item"]]
+                    item["value"] = fields[line["trial"], item["item"]]
 
-        for path, told in zip(paths, reversed(values), strict=True):
-            forge(path, partial(give, told=told))
+        for path, value in zip(paths, reversed(values), strict=True):
+            forge(path, partial(give, told=value))
 
     def false_withdrawal(self, participant: str) -> None:
-        """Say of a participant who was deleted that they withdrew."""
+        """Record a withdrawal for a deleted participant."""
         folder = StudyFolder(self.study)
-        erased = tuple(describe_session(one) for one in folder.sessions() if one.participant == participant)
+        erased = tuple(describe_session(session) for session in folder.sessions() if session.participant == participant)
         self.delete(f"data/sub-{participant}")
         self.cover_up()
         add_tombstone(
@@ -302,7 +307,7 @@ class Changed(Files):
         forge(self.journal, change)
 
     def add(self, **fields: Any) -> None:
-        """Add a line to the journal like the last one, but for some fields."""
+        """Add a copy of the last line, with some fields changed, to the journal."""
         forge(self.journal, lambda lines: lines.append(lines[-1] | fields))
 
     def half(self) -> None:
@@ -322,7 +327,7 @@ class Changed(Files):
         forge(self.journal, change)
 
     def unchained(self) -> None:
-        """Make of the journal one of format 1, whose lines do not follow from one another."""
+        """Turn the journal into format 1, whose lines are not chained by hashes."""
         forge(self.journal, lambda lines: lines[0].pop("format"), chained=False)
 
     def late_chain(self) -> None:
@@ -337,7 +342,7 @@ class Changed(Files):
         self.write(NAMES["JOURNAL"], first + second + b"".join(rest))
 
     def receipt_hash(self) -> None:
-        """Let the journal name the receipt as it is."""
+        """Set the receipt's hash in the journal to that of the present receipt."""
         self.edit("session_started", receipt_hash=receipt.digest(receipt.read(self.journal.with_name("receipt.json"))))
 
     def cover_up(self) -> None:
@@ -351,7 +356,7 @@ class Changed(Files):
 
 
 def player(made: dict[str, Path], folder: Path) -> Play:
-    """Return what plays transcripts of copies of studies in a folder, which holds nothing else."""
+    """Return a function that plays transcripts on copies of studies in an otherwise empty folder."""
 
     def begun(start: str) -> Changed:
         for path in folder.iterdir():

@@ -21,10 +21,10 @@ def numbered(*lines: Event) -> list[Event]:
     return [replace(line, n=number) for number, line in enumerate(lines, start=1)]
 
 
-def answered(*rows: dict[str, Any], form: str | None = None) -> list[Event]:
-    """Return a trial or a form in which 4 and then 5 was chosen for one of two items, and these rows were confirmed."""
+def confirmed_answer(*rows: dict[str, Any], form: str | None = None) -> list[Event]:
+    """Return a trial or a form with the choices 4 and 5 for one of two items, and these confirmed rows."""
     where = {"trial": 3} if form is None else {"form": form}
-    begun = trial(3) if form is None else shown(form)
+    begun = trial(3) if form is None else form_shown(form)
     end = "responses" if form is None else "form_answered"
     return numbered(
         begun,
@@ -58,7 +58,7 @@ def test_an_answer_that_differs_from_the_choices_is_named_with_its_line(
     """Times in lines are rounded to a microsecond."""
     end = "responses" if form is None else "form_answered"
     expected = [f"line 6 ({end}) has an answer for 'calm' in {where} {WAS_CHANGED}"] if is_changed else []
-    assert list(_changed_responses(answered(ROW | changes, WARM, form=form))) == expected
+    assert list(_changed_responses(confirmed_answer(ROW | changes, WARM, form=form))) == expected
 
 
 def test_an_answer_without_a_choice_and_a_choice_without_an_answer_are_named() -> None:
@@ -66,16 +66,16 @@ def test_an_answer_without_a_choice_and_a_choice_without_an_answer_are_named() -
     lacking = "line 6 (responses) does not contain the answer to {!r} in trial 3: it has been changed"
     invented = f"line 6 (responses) has an answer for 'cold' in trial 3 {WAS_CHANGED}"
     cold = {"item": "cold", "number": 3, "value": 2, "first_s": 3.5, "last_s": 3.5, "changes": 0}
-    assert list(_changed_responses(answered(ROW, WARM, cold))) == [invented]
-    (row,) = answered(ROW)[-1].items  # type: ignore[attr-defined]
+    assert list(_changed_responses(confirmed_answer(ROW, WARM, cold))) == [invented]
+    (row,) = confirmed_answer(ROW)[-1].items  # type: ignore[attr-defined]
     for kind, expected in ((None, [lacking.format("warm")]), ("statement", [])):
-        lines = answered(ROW)
+        lines = confirmed_answer(ROW)
         lines[-1] = replace(lines[-1], items=(replace(row, kind=kind),))  # type: ignore[call-arg]
         assert list(_changed_responses(lines)) == expected
-    assert list(_changed_responses(answered(WARM))) == [lacking.format("calm")]
+    assert list(_changed_responses(confirmed_answer(WARM))) == [lacking.format("calm")]
 
 
-def shown(form: str, after: str | None = None) -> Event:
+def form_shown(form: str, after: str | None = None) -> Event:
     return event_of("form_shown", form=form, after=after)
 
 
@@ -103,18 +103,18 @@ FORM_1 = "line 1 shows form start, which was never confirmed: a line was removed
         ((trial(3), CHOICE, event_of("passed_over", trial=3, reason=""), trial(4)), []),
         ((trial(3), CHOICE, event_of("responses", trial=4, attempt=1), trial(4)), [ANSWER_OF_2]),
         ((trial(3), event_of("choice", form="start", item="calm", value=5), trial(4)), []),
-        ((shown("start"), ASKED), [FORM_1]),
-        ((shown("start"), trial(1)), [FORM_1]),
-        ((shown("start"), shown("load")), [FORM_1]),
-        ((shown("start"), shown("start", "stir")), [FORM_1]),
-        ((shown("start"), shown("start"), COMPLETED), [FORM_1.replace("line 1", "line 2")]),
-        ((shown("start"), event_of("form_answered", form="start"), ASKED), []),
-        ((shown("start"), event_of("session_resumed"), ASKED), []),
-        ((shown("start"), event_of("passed_over", page="rest", reason=""), ASKED), []),
-        ((shown("start"), ABORTED), []),
+        ((form_shown("start"), ASKED), [FORM_1]),
+        ((form_shown("start"), trial(1)), [FORM_1]),
+        ((form_shown("start"), form_shown("load")), [FORM_1]),
+        ((form_shown("start"), form_shown("start", "stir")), [FORM_1]),
+        ((form_shown("start"), form_shown("start"), COMPLETED), [FORM_1.replace("line 1", "line 2")]),
+        ((form_shown("start"), event_of("form_answered", form="start"), ASKED), []),
+        ((form_shown("start"), event_of("session_resumed"), ASKED), []),
+        ((form_shown("start"), event_of("passed_over", page="rest", reason=""), ASKED), []),
+        ((form_shown("start"), ABORTED), []),
     ],
 )
-def test_a_session_that_goes_on_confirmed_what_was_asked(lines: tuple[Event, ...], sentences: list[str]) -> None:
+def test_answers_of_a_continued_session_were_confirmed(lines: tuple[Event, ...], sentences: list[str]) -> None:
     assert list(_unconfirmed_answers(numbered(*lines))) == sentences
 
 
@@ -125,23 +125,23 @@ def test_each_field_of_a_receipt_that_the_journal_contradicts_is_named() -> None
     entry = {"at": LATER, "operator": "CD"}
     start = event_of("session_started", at=AT, device="falcon", version=__version__)
     resumed = event_of("session_resumed", at=LATER, receipt_hash=receipt.digest(entry))
-    held = {
+    fields = {
         "started_at": AT, "status": "unfinished", "reason": "", "ended_at": None, "generator": receipt.GENERATOR,
         "device": {"name": "falcon"}, "clock": {"origin_at": AT}, "versions": {"liquid-study": __version__},
         "resumed": [entry],
     }  # fmt: skip
-    assert _differing_fields(held, [start, resumed]) == []
+    assert _differing_fields(fields, [start, resumed]) == []
     for name, wrong in (
         ("started_at", LATER), ("status", "completed"), ("reason", "tired"), ("ended_at", LATER), ("generator", "dice"),
         ("device", {"name": "mouse"}), ("device", {}), ("clock", {"origin_at": LATER}),
         ("versions", {"liquid-study": "0.1"}), ("resumed", [entry | {"operator": "EF"}]),
         ("resumed", [entry | {"at": AT}]), ("resumed", [7]),
     ):  # fmt: skip
-        assert _differing_fields(held | {name: wrong}, [start, resumed]) == [name]
-    ended = held | {"status": "completed", "reason": "r", "ended_at": LATER}
+        assert _differing_fields(fields | {name: wrong}, [start, resumed]) == [name]
+    ended = fields | {"status": "completed", "reason": "r", "ended_at": LATER}
     assert _differing_fields(ended, [start, resumed, COMPLETED]) == []
     without_hash = replace(resumed, receipt_hash=None)  # type: ignore[call-arg]
-    assert _differing_fields(held | {"resumed": [entry | {"operator": "EF"}]}, [start, without_hash]) == []
+    assert _differing_fields(fields | {"resumed": [entry | {"operator": "EF"}]}, [start, without_hash]) == []
     earlier = replace(start, version="0.1")  # type: ignore[call-arg]
-    of_earlier = held | {"generator": "dice", "versions": {"liquid-study": "0.1"}}
+    of_earlier = fields | {"generator": "dice", "versions": {"liquid-study": "0.1"}}
     assert _differing_fields(of_earlier, [earlier, resumed]) == []

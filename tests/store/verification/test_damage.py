@@ -63,7 +63,7 @@ def study(tmp_path: Path, start: Start, attend: Attend, finished: Start) -> Path
 @pytest.mark.variants(8)
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("damage", [with_a_bit_flipped, with_an_odd_value, with_deep_nesting])
-def test_no_damage_ends_in_a_traceback_or_hides_a_session(
+def test_damage_neither_raises_a_traceback_nor_hides_a_session(
     tmp_path: Path, study: Path, protocol: Protocol, name: str, damage: Callable[[bytes, random.Random], bytes]
 ) -> None:
     if damage is not with_a_bit_flipped and name.endswith((".csv", ".sha256")):
@@ -80,7 +80,7 @@ def test_no_damage_ends_in_a_traceback_or_hides_a_session(
 
 
 def look_at(results: Path, study: Path, protocol: Protocol) -> None:
-    """Read everything as the commands and the home window do: nothing but an error for people may come of it."""
+    """Read a study like the commands and the home window; only errors of the program may be raised."""
     assert {facts.participant for facts in sessions(results, {})} == {"P007", "P008"}
     actions: tuple[Callable[[], object], ...] = (
         lambda: verify_study(study),
@@ -103,15 +103,15 @@ def test_a_damaged_journal_is_listed_as_damaged_and_never_sound(
     for _ in range(CASES):
         path.write_bytes(damage(content, chance))
         assert not verify_study(study).is_sound
-        listed = {facts.participant: facts.status for facts in sessions(tmp_path, {})}
-        assert listed["P008"] == "unfinished"
+        status_of = {facts.participant: facts.status for facts in sessions(tmp_path, {})}
+        assert status_of["P008"] == "unfinished"
         if scan(path).damage is not None:
-            assert listed["P007"] == "damaged"
+            assert status_of["P007"] == "damaged"
 
 
 @pytest.fixture
 def session(start: Start, samples_of: Make, summary: dict[str, Any]) -> Path:
-    """Return the folder of a session with one recorded trial, which ended."""
+    """Return the folder of an ended session with one recorded trial."""
     store = start(recordings=True)
     assert store.recorder is not None
     store.append(
@@ -119,8 +119,8 @@ def session(start: Start, samples_of: Make, summary: dict[str, Any]) -> Path:
     )
     store.recorder.start(1, 1, 1000.0)
     store.recorder.append(samples_of(40))
-    for shown in range(9):
-        store.recorder.frame(16 * shown + 9, 16 * shown)
+    for pages_shown in range(9):
+        store.recorder.frame(16 * pages_shown + 9, 16 * pages_shown)
     store.recorder.stop()
     store.append(event_of("trial_ended", trial=1, attempt=1, outcome="complete", **summary))
     store.finish("completed")
@@ -128,7 +128,7 @@ def session(start: Start, samples_of: Make, summary: dict[str, Any]) -> Path:
 
 
 def flipped(content: bytes, chance: random.Random, *, footer: bool) -> Iterator[bytes]:
-    """Yield the file with one bit changed, again and again: in its footer, or anywhere."""
+    """Yield copies of the file with one bit flipped, in its footer or anywhere."""
     size = 8 + int.from_bytes(content[-8:-4], "little") if footer else len(content)
     while True:
         at = len(content) - 1 - chance.randrange(size)
@@ -150,9 +150,9 @@ def test_a_changed_bit_of_a_recording_is_an_error_and_never_a_traceback(session:
     changes = flipped(content, chance, footer=footer)
     for number in range(CASES * 20):
         path.write_bytes(next(changes))
-        for read in READERS:
+        for reader in READERS:
             with contextlib.suppress(StudyError):
-                read(path, secret)
+                reader(path, secret)
         if number % 20 == 0:
             findings = verify_study(session.parents[2])
             assert any(name in str(error) for error in findings.errors)

@@ -32,14 +32,14 @@ P007 = "data/sub-P007/ses-01"
 
 @pytest.fixture
 def study(tmp_path: Path, finished: Start) -> Path:
-    """Two rehearsed sessions that ended; their fingerprints are kept in tmp_path/kept.txt."""
+    """Two ended rehearsed sessions; tmp_path/kept.txt is a copy of their fingerprints."""
     for person in ("P007", "P008"):
         finished(person, simulated=True)
     shutil.copy(tmp_path / "study" / "fingerprints.txt", tmp_path / "kept.txt")
     return tmp_path / "study"
 
 
-def told(study: Path, kept: Path | None = None) -> str:
+def errors_text(study: Path, kept: Path | None = None) -> str:
     return "\n".join(map(str, verify_study(study, kept).errors))
 
 
@@ -56,8 +56,8 @@ def test_a_session_that_was_aborted_before_its_last_page_came_again_is_sound(
     store.append(events.PageShown(page="consent"))
     store.append(events.PageLeft(page="consent"))
     store.finish("aborted", "tired")
-    found = verify_study(tmp_path / "study")
-    assert (found.errors, found.warnings) == ((), ())
+    verification = verify_study(tmp_path / "study")
+    assert (verification.errors, verification.warnings) == ((), ())
 
 
 @pytest.mark.parametrize(
@@ -72,8 +72,8 @@ def test_a_session_that_was_aborted_before_its_last_page_came_again_is_sound(
 def test_a_removed_confirmation_is_found_where_the_session_went_on(
     tmp_path: Path, removed: Callable[[dict[str, Any]], bool], number: int
 ) -> None:
-    """Also of a session that was completed right after it, and whose last form has no answer."""
-    felt = {
+    """The session may also have been completed right after it, or its last form may lack answers."""
+    features = {
         ("stir", name): (
             TrialFeatures(
                 force_mean_n=1.0, force_peak_n=4.0, speed_rms_mps=0.1, push_share=0.02, roughness_n=0.03, delay_s=0.0
@@ -83,7 +83,7 @@ def test_a_removed_confirmation_is_found_where_the_session_went_on(
     }
     shorter = 'sequence = ["start", "stir", "load", "usability", "end"]', 'sequence = ["start", "stir", "end"]'
     file = mixed_file(tmp_path, shorter)
-    study = rehearse_answers(file, participants=1, seed=1, results=tmp_path / "mixed", features=felt)
+    study = rehearse_answers(file, participants=1, seed=1, results=tmp_path / "mixed", features=features)
     assert verify_study(study).errors == ()
     journal = study / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
 
@@ -92,7 +92,7 @@ def test_a_removed_confirmation_is_found_where_the_session_went_on(
 
     forge(journal, edit)
     cover_up(study)
-    assert told(study).count("was never confirmed: a line was removed") == number
+    assert errors_text(study).count("was never confirmed: a line was removed") == number
 
 
 @pytest.mark.parametrize("key", ["value", "changes", "onset_s", "first_s", "last_s"])
@@ -103,7 +103,7 @@ def test_a_confirmed_answer_that_was_not_chosen_is_found(study: Path, key: str) 
 
     forge(study / P007 / "journal.jsonl", edit)
     cover_up(study)
-    assert "that differs from the one chosen earlier: it has been changed" in told(study)
+    assert "that differs from the one chosen earlier: it has been changed" in errors_text(study)
 
 
 def test_a_session_that_left_its_last_page_was_not_aborted(tmp_path: Path) -> None:
@@ -112,10 +112,10 @@ def test_a_session_that_left_its_last_page_was_not_aborted(tmp_path: Path) -> No
     forge(session / "journal.jsonl", lambda lines: lines[-1].update(status="aborted"))
     receipt.write(session / "receipt.json", receipt.read(session / "receipt.json") | {"status": "aborted"})
     cover_up(study)
-    assert "its status is 'aborted', although the last page was completed: it has been changed" in told(study)
+    assert "its status is 'aborted', although the last page was completed: it has been changed" in errors_text(study)
 
 
-def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:
+def test_a_fingerprint_is_computed_as_documented(study: Path) -> None:
     """It can be computed without this program: SHA-256 of some lines of the list, in base32."""
     proofs = read_list(StudyFolder(study).fingerprints)
     assert proofs
@@ -135,7 +135,9 @@ def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:
         (b"k3vq-7m2p-xw4d data/sub-P007/ses-01\nx\n", "line 2 is not a fingerprint"),
     ],
 )
-def test_a_copy_that_is_none_is_named(study: Path, tmp_path: Path, content: bytes | None, sentence: str) -> None:
+def test_a_file_that_is_not_a_copy_of_the_fingerprints_is_named(
+    study: Path, tmp_path: Path, content: bytes | None, sentence: str
+) -> None:
     path = tmp_path / "copy.txt"
     if content is not None:
         path.write_bytes(content)
@@ -145,10 +147,10 @@ def test_a_copy_that_is_none_is_named(study: Path, tmp_path: Path, content: byte
 
 def test_the_command_compares_with_the_copy(study: Path, tmp_path: Path) -> None:
     words = ["verify", str(study), "--fingerprints", str(tmp_path / "kept.txt")]
-    done = CliRunner().invoke(commands, words)
-    assert (done.exit_code, done.output.splitlines()[-1]) == (0, "2 sessions: sound")
+    result = CliRunner().invoke(commands, words)
+    assert (result.exit_code, result.output.splitlines()[-1]) == (0, "2 sessions: sound")
     forget_a_participant(study)
     cover_up(study)
-    done = CliRunner().invoke(commands, words)
-    assert (done.exit_code, done.output.splitlines()[-1]) == (3, "1 session: not sound")
-    assert f"error: {P007}: is missing, but" in done.output
+    result = CliRunner().invoke(commands, words)
+    assert (result.exit_code, result.output.splitlines()[-1]) == (3, "1 session: not sound")
+    assert f"error: {P007}: is missing, but" in result.output

@@ -16,7 +16,7 @@ from tests.protocol.trials.level_studies import study as levels_study
 from tests.store.conftest import Attend, Make, Start, Tables
 
 
-def found(folder: Path, protocol: Protocol) -> list[tuple[str, str]]:
+def leaks_in(folder: Path, protocol: Protocol) -> list[tuple[str, str]]:
     return [(leak.place, leak.word) for leak in find_leaks(folder, telltales(protocol))]
 
 
@@ -32,7 +32,7 @@ def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, star
     store.finish("completed")
     (store.folder.path / "quagmire.txt").write_text("first\nfeel_quagmire is it", encoding="utf-8", newline="\n")
     session = "data/sub-P007/ses-01"
-    assert found(tmp_path / "study", protocol) == [
+    assert leaks_in(tmp_path / "study", protocol) == [
         (f"{session}/journal.jsonl, line 2, text", "mildew"),
         (f"{session}/journal.jsonl, line 2, text", "137"),
         (f"{session}/journal.jsonl, line 3, code", "see_tardy"),
@@ -47,20 +47,20 @@ def test_the_preregistration_names_the_conditions(tmp_path: Path, protocol: Prot
     start().finish("completed")
     folder = StudyFolder(tmp_path / "study")
     folder.preregistration.write_text("agreement is higher in mildew than in quagmire", encoding="utf-8", newline="\n")
-    assert found(folder.path, protocol) == []
+    assert leaks_in(folder.path, protocol) == []
     folder.preregistration.rename(folder.path / "draft.md")
-    assert found(folder.path, protocol) == [("draft.md, line 1", "mildew"), ("draft.md, line 1", "quagmire")]
+    assert leaks_in(folder.path, protocol) == [("draft.md, line 1", "mildew"), ("draft.md, line 1", "quagmire")]
 
 
-def test_statements_may_name_what_they_ask(tmp_path: Path, tables_of_study: Tables, start: Start) -> None:
-    """A statement asks whether it feels like mildew, and has that name; elsewhere the word tells."""
+def test_statements_may_name_their_attribute(tmp_path: Path, tables_of_study: Tables, start: Start) -> None:
+    """The name of a statement about mildew is permitted, but the word reveals a condition elsewhere."""
     tables = tables_of_study()
     item = {"id": "mildew", "text": "I think it is mildew.", "short": "mildew"}
     tables["questionnaires"]["form"]["items"] = [item]
     protocol = Protocol.model_validate(tables)
     store = start(protocol=protocol)
-    told = {"block": "liquids", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
-    store.append(journal_events.TrialStarted(trial=1, attempt=1, **told))
+    fields = {"block": "liquids", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    store.append(journal_events.TrialStarted(trial=1, attempt=1, **fields))
     store.append(journal_events.ItemShown(trial=1, item="mildew"))
     store.append(journal_events.Choice(trial=1, item="mildew", value=4))
     answer = {"item": "mildew", "number": 1, "value": 4, "onset_s": 1.5, "first_s": 2.0, "last_s": 2.0, "changes": 0}
@@ -68,11 +68,11 @@ def test_statements_may_name_what_they_ask(tmp_path: Path, tables_of_study: Tabl
     store.finish("completed")
     assert b"mildew" in store.folder.table("brackish", "responses").read_bytes()
     assert b"mildew" in store.folder.receipt.read_bytes()
-    assert found(tmp_path / "study", protocol) == []
+    assert leaks_in(tmp_path / "study", protocol) == []
 
 
 @pytest.mark.parametrize("simulated", [False, True], ids=["real", "rehearsed"])
-def test_a_finished_session_tells_nothing(
+def test_a_finished_session_reveals_no_condition(
     tmp_path: Path, protocol: Protocol, start: Start, attend: Attend, samples_of: Make, *, simulated: bool
 ) -> None:
     store = start(simulated=simulated, recordings=True)
@@ -83,12 +83,12 @@ def test_a_finished_session_tells_nothing(
     store.append(journal_events.Note(kind="mark", text=""))
     store.finish("completed")
     assert len(list((tmp_path / "study").rglob("*.*"))) >= 11
-    assert found(tmp_path / "study", protocol) == []
+    assert leaks_in(tmp_path / "study", protocol) == []
     assert not telltales(protocol).words & set(re.findall(r"[\w.]+", repr(store.key)))
 
 
-def test_what_stands_somewhere_by_chance_or_is_published_tells_nothing_for_certain() -> None:
-    """Of the thesis' study: its liquids' names are in statements, its numbers are short; what is left is certain."""
+def test_published_and_common_words_are_not_certain_leaks() -> None:
+    """The thesis' study names liquids in statements and has short numbers; only other words are certain leaks."""
     protocol = load("rek2024")
     tables = protocol.model_dump(mode="json", include={"liquids", "conditions"})
     words = certain_telltales(tables, receipt.without_conditions(protocol)).words
@@ -96,7 +96,7 @@ def test_what_stands_somewhere_by_chance_or_is_published_tells_nothing_for_certa
     assert not {"honey", "practice", "1", "50", "0.068", "1000"} & words
 
 
-def test_the_name_of_a_condition_that_every_folder_contains_anyway_is_no_leak(
+def test_common_words_as_condition_names_are_not_reported_as_leaks(
     tmp_path: Path, protocol: Protocol, start: Start, attend: Attend
 ) -> None:
     """Labs name their conditions "a", "none" or "force"; "n/a" and the descriptions of columns do not reveal them."""
@@ -119,7 +119,7 @@ def test_levels_standards_and_comparisons_are_looked_for_in_every_unit(tmp_path:
     (tmp_path / "notes.txt").write_text(
         f"level 0.2371\nnothing\nfelt {comparison!r} Pa s, or {comparison * 1000!r}", encoding="utf-8", newline="\n"
     )
-    assert {place for place, _ in found(tmp_path, protocol)} == {"notes.txt, line 1", "notes.txt, line 3"}
+    assert {place for place, _ in leaks_in(tmp_path, protocol)} == {"notes.txt, line 1", "notes.txt, line 3"}
     published = receipt.without_conditions(protocol)
     certain = certain_telltales({"liquids": {}, "conditions": {}}, published, presented_numbers(protocol))
     assert certain.in_text(f"{comparison!r} and 0.2371") == [repr(comparison)], "short numbers stand anywhere"

@@ -80,6 +80,6 @@ def test_compared_conditions_follow_from_the_key(tmp_path: Path) -> None:
     path = tmp_path / "pairs.toml"
     path.write_text(text.replace("min_s = 1", "min_s = 0.3"), encoding="utf-8", newline="\n")
     study = rehearse(path, participants=1, seed=2, results=tmp_path / "study", recordings=False)
-    found = reproduce_session(next((study / "data").glob("sub-*/ses-*")))
-    assert found.differences == []
-    assert found.followed == ["viscosity: 4 of 4 levels are consistent with the answers"]
+    reproduction = reproduce_session(next((study / "data").glob("sub-*/ses-*")))
+    assert reproduction.differences == []
+    assert reproduction.followed == ["viscosity: 4 of 4 levels are consistent with the answers"]

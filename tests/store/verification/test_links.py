@@ -31,31 +31,33 @@ from tests.store.conftest import Start
 
 
 @pytest.fixture
-def finished(finished: Start) -> SessionStore:
+def finished_session(finished: Start) -> SessionStore:
     store = finished()
     return store
 
 
-def read(path: Path) -> object:
+def key_beside(path: Path) -> object:
     if path.name == "key.sealed":
         return blinding.read_key(path.parents[1])
     return journal.read(path) if path.suffix == ".jsonl" else receipt.read(path)
 
 
-def test_a_study_that_is_called_by_a_path_is_not_exported(tmp_path: Path, finished: SessionStore) -> None:
-    for path in (finished.folder.receipt, finished.place.study_folder.description):
-        held = json.loads(path.read_bytes())
-        (held["protocol"]["study"] if "protocol" in held else held)["name"] = "../../../../ESCAPED"
-        path.write_text(json.dumps(held), encoding="utf-8", newline="\n")
+def test_a_study_that_is_called_by_a_path_is_not_exported(tmp_path: Path, finished_session: SessionStore) -> None:
+    for path in (finished_session.folder.receipt, finished_session.place.study_folder.description):
+        content = json.loads(path.read_bytes())
+        (content["protocol"]["study"] if "protocol" in content else content)["name"] = "../../../../ESCAPED"
+        path.write_text(json.dumps(content), encoding="utf-8", newline="\n")
     before = {path for path in tmp_path.rglob("*") if "out" not in path.parts}
-    done = CliRunner().invoke(commands, ["export", str(tmp_path / "study"), "--to", str(tmp_path / "a" / "b" / "out")])
-    assert isinstance(done.exception, AnalysisError | StoreError)
+    result = CliRunner().invoke(
+        commands, ["export", str(tmp_path / "study"), "--to", str(tmp_path / "a" / "b" / "out")]
+    )
+    assert isinstance(result.exception, AnalysisError | StoreError)
     assert {path for path in tmp_path.rglob("*") if "out" not in path.parts} == before
 
 
 @pytest.mark.parametrize("name", ["../escaped.csv", "within/../../escaped.csv", "/escaped.csv", "linked/escaped.csv"])
 @needs_links
-def test_nothing_is_written_outside_of_the_folder_asked_for(tmp_path: Path, name: str) -> None:
+def test_files_are_written_only_into_the_requested_folder(tmp_path: Path, name: str) -> None:
     to = tmp_path / "out"
     to.mkdir()
     (to / "linked").symlink_to(tmp_path)
@@ -66,10 +68,10 @@ def test_nothing_is_written_outside_of_the_folder_asked_for(tmp_path: Path, name
 
 
 @needs_links
-def test_a_study_is_used_through_a_link_to_its_folder(tmp_path: Path, finished: SessionStore) -> None:
+def test_a_study_is_used_through_a_link_to_its_folder(tmp_path: Path, finished_session: SessionStore) -> None:
     study = tmp_path / "linked"
     study.symlink_to(tmp_path / "study")
-    finished.folder.checksums.unlink()
+    finished_session.folder.checksums.unlink()
     rebuild_session(study / "data/sub-P007/ses-01")
     assert verify_study(study).is_sound
     exclude(study, "P007", 1, by="AB", reason="coughed")
@@ -94,12 +96,12 @@ def test_a_study_is_used_through_a_link_to_its_folder(tmp_path: Path, finished: 
         "data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv",
     ],
 )
-def test_an_endless_device_is_never_read(tmp_path: Path, finished: SessionStore, name: str) -> None:
-    """Neither by `verify` nor by what looks for doubts, each of which says what is wrong."""
+def test_an_endless_device_is_never_read(tmp_path: Path, finished_session: SessionStore, name: str) -> None:
+    """Neither `verify` nor the search for doubts reads it; both report the error."""
     path = tmp_path / "study" / name
     path.unlink(missing_ok=True)
     path.symlink_to("/dev/zero")
-    said = tmp_path / "said.txt"
+    output_file = tmp_path / "said.txt"
 
     def look() -> None:
         import resource
@@ -108,20 +110,24 @@ def test_an_endless_device_is_never_read(tmp_path: Path, finished: SessionStore,
         resource.setrlimit(resource.RLIMIT_DATA, (2**32, 2**32))
         study = StudyFolder(tmp_path / "study")
         try:
-            found = [str(one) for of in study.sessions() for one in session_discrepancies(Place(study, of, "brackish"))]
-            said.write_text(
-                "\n".join([*found, *map(str, verify_study(study.path).errors)]), encoding="utf-8", newline="\n"
+            discrepancies = [
+                str(discrepancy)
+                for of in study.sessions()
+                for discrepancy in session_discrepancies(Place(study, of, "brackish"))
+            ]
+            output_file.write_text(
+                "\n".join([*discrepancies, *map(str, verify_study(study.path).errors)]), encoding="utf-8", newline="\n"
             )
         except StudyError as error:
-            said.write_text(str(error), encoding="utf-8", newline="\n")
+            output_file.write_text(str(error), encoding="utf-8", newline="\n")
 
     assert forked(look) == 0
-    assert path.name in said.read_text("utf-8")
+    assert path.name in output_file.read_text("utf-8")
 
 
 @needs_fork
 @pytest.mark.parametrize("name", [".psychds-ignore", "data/sub-P007/ses-01/{}trials_data.csv"])
-def test_a_pipe_is_never_waited_for(tmp_path: Path, finished: SessionStore, name: str) -> None:
+def test_a_pipe_is_never_waited_for(tmp_path: Path, finished_session: SessionStore, name: str) -> None:
     study = tmp_path / "study"
     path = study / name.format("subject-P007_session-01_task-brackish_description-")
     path.unlink()
@@ -130,33 +136,33 @@ def test_a_pipe_is_never_waited_for(tmp_path: Path, finished: SessionStore, name
     def act() -> None:
         signal.alarm(20)
         try:
-            told = unblind(study, "AB", "to analyse").left
+            left_files = unblind(study, "AB", "to analyse").left
             withdraw(study, "P007", by="AB", reason="asked")
         except StoreError as error:
-            told = (str(error),)
-        assert path.name in "\n".join(told)
+            left_files = (str(error),)
+        assert path.name in "\n".join(left_files)
 
     assert forked(act) == 0
     assert not (study / "withdrawals.jsonl").exists()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names are texts elsewhere")
-def test_a_name_that_is_no_text_is_reported_and_searched(tmp_path: Path, finished: SessionStore) -> None:
+def test_a_file_name_that_is_not_utf_8_is_reported_and_searched(tmp_path: Path, finished_session: SessionStore) -> None:
     study, name = tmp_path / "study", os.fsdecode(b"P007\xff.csv")
-    for folder in (study, finished.folder.path):
+    for folder in (study, finished_session.folder.path):
         (folder / name).write_bytes(b"")
-    assert name in [Path(one.place).name for one in verify_study(study).errors]
-    finished.folder.checksums.unlink()
-    rebuild_session(finished.folder.path)
-    assert name not in [Path(one.place).name for one in verify_study(study).errors]
+    assert name in [Path(error.place).name for error in verify_study(study).errors]
+    finished_session.folder.checksums.unlink()
+    rebuild_session(finished_session.folder.path)
+    assert name not in [Path(error.place).name for error in verify_study(study).errors]
     left = withdraw(study, "P007", by="AB", reason="asked").left
     assert left == (f"{study / name} still names P007",)
 
 
-def test_of_the_listed_files_only_the_one_that_cannot_be_read_is_an_error(
-    finished: SessionStore, monkeypatch: pytest.MonkeyPatch
+def test_only_the_unreadable_of_the_listed_files_is_an_error(
+    finished_session: SessionStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder, study = finished.folder, finished.place.study_folder.path
+    folder, study = finished_session.folder, finished_session.place.study_folder.path
     notes, photo = folder.path / "notes.txt", folder.path / "photo.jpg"
     notes.write_bytes(b"calm")
     photo.write_bytes(b"smile")

@@ -31,8 +31,8 @@ P001 = "data/sub-P001/ses-01"
 
 @pytest.fixture
 def study(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = once(tmp_path_factory, "proved", lambda folder: proved(folder / "demo"))
-    shutil.copytree(made, tmp_path / "proved")
+    proved_study = once(tmp_path_factory, "proved", lambda folder: proved(folder / "demo"))
+    shutil.copytree(proved_study, tmp_path / "proved")
     assert verify_study(tmp_path / "proved" / "demo").errors == ()
     return tmp_path / "proved" / "demo"
 
@@ -42,33 +42,34 @@ def key_store(tmp_path: Path) -> Iterator[Path]:
     """A file that the library of key stores uses."""
     keyring = pytest.importorskip("keyring", reason="the optional extra proofs is not installed")
     backend = pytest.importorskip("keyring.backend")
-    held = tmp_path / "keys.json"
+    key_file = tmp_path / "keys.json"
 
     class InFile(backend.KeyringBackend):  # type: ignore[misc, name-defined]
         priority = 1
 
         def get_password(self, service: str, username: str) -> str | None:
-            return json.loads(held.read_text("utf-8")).get(f"{service}/{username}") if held.exists() else None
+            return json.loads(key_file.read_text("utf-8")).get(f"{service}/{username}") if key_file.exists() else None
 
         def set_password(self, service: str, username: str, password: str) -> None:
-            held.write_text(json.dumps({f"{service}/{username}": password}), encoding="utf-8", newline="\n")
+            key_file.write_text(json.dumps({f"{service}/{username}": password}), encoding="utf-8", newline="\n")
 
     before = keyring.get_keyring()
     keyring.set_keyring(InFile())
-    yield held
+    yield key_file
     keyring.set_keyring(before)
 
 
-def test_the_page_lists_the_forgeries_and_what_tells_them() -> None:
+def test_the_documentation_lists_the_forgeries_and_their_detection() -> None:
     page = " ".join((Path(__file__).parents[3] / "docs" / "files.md").read_text(encoding="utf-8").split())
     tried = (Path(__file__).parent / "transcripts" / "proofs.txt").read_text(encoding="utf-8").split("=== ")[1:]
     verdicts = [
-        (one.partition("\n")[0], *re.findall(r"running: (sound|not sound)$", one, re.MULTILINE)) for one in tried
+        (output.partition("\n")[0], *re.findall(r"running: (sound|not sound)$", output, re.MULTILINE))
+        for output in tried
     ]
-    assert {kept for _, _, kept in verdicts} == {"not sound"}
+    assert {kept_verdict for _, _, kept_verdict in verdicts} == {"not sound"}
     assert f"We tested {len(tried)} forgeries" in page
     assert f"reveal all {len(tried)} forgeries." in page
-    alone = {name for name, found, _ in verdicts if found == "not sound"}
+    alone = {name for name, verdict, _ in verdicts if verdict == "not sound"}
     assert len(alone) == 6
     assert "On its own, `verify` detects six, such as a changed answer or a deleted session folder" in page
     assert alone > {"an answer changed in the journal", "an answer changed in a table", "a session's folder deleted"}
@@ -87,63 +88,63 @@ def test_the_page_lists_the_forgeries_and_what_tells_them() -> None:
 
 
 def test_lines_of_records_are_compared_and_a_withdrawal_that_was_asked_for_adds_its_own(study: Path) -> None:
-    kept = study.parent / "kept.txt"
-    lines = [line.split()[1] for line in kept.read_text("utf-8").splitlines()]
+    proof_copy = study.parent / "kept.txt"
+    lines = [line.split()[1] for line in proof_copy.read_text("utf-8").splitlines()]
     names = ["withdrawals.jsonl/sub-P003", "reveals.jsonl", "exclusions.csv/sub-P002"]
     assert lines == [P001, P001.replace("1/", "2/"), *names]
     typed = study.parent / "typed.txt"
-    typed.write_text(kept.read_text("utf-8").upper(), encoding="utf-8", newline="\n")
-    assert verify_study(study, kept).errors == verify_study(study, typed).errors == ()
+    typed.write_text(proof_copy.read_text("utf-8").upper(), encoding="utf-8", newline="\n")
+    assert verify_study(study, proof_copy).errors == verify_study(study, typed).errors == ()
     (study / "blinding" / "reveals.jsonl").write_bytes(b"")
-    assert "reveals.jsonl: does not contain " in "\n".join(map(str, verify_study(study, kept).errors))
+    assert "reveals.jsonl: does not contain " in "\n".join(map(str, verify_study(study, proof_copy).errors))
     words = ("withdraw", str(study), "--participant", "P002", "--by", "AK", "--reason", "asked")
-    said = CliRunner().invoke(commands, words).stdout.splitlines()
-    told = "\n".join(map(str, verify_study(study, kept).errors))
-    line = next(words for words in said if words.startswith("keep this line")).partition(":  ")[2]
-    assert f"the withdrawal of P002 is not in {kept}: if P002 requested it, add the line: {line}" in told
-    kept.write_text(f"{kept.read_text('utf-8')}{line}\n", encoding="utf-8", newline="\n")
-    assert "P002" not in "\n".join(map(str, verify_study(study, kept).errors))
+    result = CliRunner().invoke(commands, words).stdout.splitlines()
+    errors_text = "\n".join(map(str, verify_study(study, proof_copy).errors))
+    line = next(words for words in result if words.startswith("keep this line")).partition(":  ")[2]
+    assert f"the withdrawal of P002 is not in {proof_copy}: if P002 requested it, add the line: {line}" in errors_text
+    proof_copy.write_text(f"{proof_copy.read_text('utf-8')}{line}\n", encoding="utf-8", newline="\n")
+    assert "P002" not in "\n".join(map(str, verify_study(study, proof_copy).errors))
 
 
 def test_a_misread_line_is_named(study: Path) -> None:
-    kept = study.parent / "kept.txt"
-    first, *rest = kept.read_text("utf-8").splitlines()
+    proof_copy = study.parent / "kept.txt"
+    first, *rest = proof_copy.read_text("utf-8").splitlines()
     other = ("b" if first[2] != "b" else "c").join((first[:2], first[3:]))
-    kept.write_text("\n".join([other, *rest]), encoding="utf-8", newline="\n")
+    proof_copy.write_text("\n".join([other, *rest]), encoding="utf-8", newline="\n")
     with pytest.raises(
         StoreError, match=r"kept.txt, line 1 was copied incorrectly: its last two characters do not match the rest"
     ):
-        verify_study(study, kept)
+        verify_study(study, proof_copy)
 
 
-def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store: Path) -> None:
-    kept = study.parent / "signed.txt"
-    done = CliRunner().invoke(commands, ["proof", str(study), "--sign", "--to", str(kept)])
-    assert (done.exit_code, done.stdout.strip()) == (0, str(kept)), done.output
-    found = verify_study(study, kept)
-    assert found.errors == ()
-    assert f"{kept} is signed with this computer's key" in "\n".join(map(str, found.warnings))
-    whole = kept.read_text("utf-8")
-    kept.write_text("".join(whole.splitlines(keepends=True)[1:]), encoding="utf-8", newline="\n")
+def test_a_signature_reveals_a_changed_copy_and_another_key(study: Path, key_store: Path) -> None:
+    proof_copy = study.parent / "signed.txt"
+    result = CliRunner().invoke(commands, ["proof", str(study), "--sign", "--to", str(proof_copy)])
+    assert (result.exit_code, result.stdout.strip()) == (0, str(proof_copy)), result.output
+    verification = verify_study(study, proof_copy)
+    assert verification.errors == ()
+    assert f"{proof_copy} is signed with this computer's key" in "\n".join(map(str, verification.warnings))
+    whole = proof_copy.read_text("utf-8")
+    proof_copy.write_text("".join(whole.splitlines(keepends=True)[1:]), encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="was changed after it was signed"):
-        verify_study(study, kept)
+        verify_study(study, proof_copy)
     key_store.unlink()
-    kept.write_text(whole, encoding="utf-8", newline="\n")
-    assert "compare it with your own" in "\n".join(read_proof(kept).notes)
+    proof_copy.write_text(whole, encoding="utf-8", newline="\n")
+    assert "compare it with your own" in "\n".join(read_proof(proof_copy).notes)
     proof_text(StudyFolder(study), sign=True)
     with pytest.raises(StoreError, match=r"signed with another computer's key .*: the signature was replaced"):
-        verify_study(study, kept)
+        verify_study(study, proof_copy)
 
 
 @pytest.mark.parametrize("forged", ["aaaa-aaaa-aaaa-aa withdrawals.jsonl/sub-P002", "P003", "# a comment"])
 def test_a_line_below_a_signature_is_refused(study: Path, key_store: Path, forged: str) -> None:
-    kept = study.parent / "signed.txt"
-    kept.write_text(proof_text(StudyFolder(study), sign=True), encoding="utf-8", newline="\n")
-    lines = len(kept.read_text("utf-8").splitlines())
-    with kept.open("a", encoding="utf-8", newline="\n") as file:
+    proof_copy = study.parent / "signed.txt"
+    proof_copy.write_text(proof_text(StudyFolder(study), sign=True), encoding="utf-8", newline="\n")
+    lines = len(proof_copy.read_text("utf-8").splitlines())
+    with proof_copy.open("a", encoding="utf-8", newline="\n") as file:
         file.write(f"\n{forged}\n")
     with pytest.raises(StoreError, match=rf"signed.txt, line {lines + 2} is below the signature or stamp"):
-        verify_study(study, kept)
+        verify_study(study, proof_copy)
 
 
 def wait_for_proofs() -> None:
@@ -197,48 +198,48 @@ def server(tmp_path: Path) -> Iterator[str]:
         thread.join()
 
 
-def test_a_stamp_tells_when_the_study_was_so_and_leaves_by_itself(
+def test_a_time_stamp_dates_the_study_and_is_requested_automatically(
     study: Path, server: str, tmp_path: Path, key_store: Path
 ) -> None:
     outside = tmp_path / "outside"
     outside.mkdir()
     words = ["proof", str(study), "--server", server, "--root", str(tmp_path / "root.pem"), "--always", str(outside)]
-    done = CliRunner().invoke(commands, [*words, "--sign"])
-    assert done.exit_code == 0, done.output
-    said: list[str] = []
-    write_proof(StudyFolder(study), said.append)
+    result = CliRunner().invoke(commands, [*words, "--sign"])
+    assert result.exit_code == 0, result.output
+    messages: list[str] = []
+    write_proof(StudyFolder(study), messages.append)
     wait_for_proofs()
-    kept = outside / "demo-proof.txt"
-    assert said == [f"the study's proof was written to {kept}"]
-    found = verify_study(study, kept)
-    assert found.errors == ()
-    assert re.search(r"was stamped at 20\d\d-", "\n".join(map(str, found.warnings)))
-    whole = kept.read_text("utf-8")
-    kept.write_text(
+    proof_copy = outside / "demo-proof.txt"
+    assert messages == [f"the study's proof was written to {proof_copy}"]
+    verification = verify_study(study, proof_copy)
+    assert verification.errors == ()
+    assert re.search(r"was stamped at 20\d\d-", "\n".join(map(str, verification.warnings)))
+    whole = proof_copy.read_text("utf-8")
+    proof_copy.write_text(
         "".join(line for line in whole.splitlines(keepends=True)[1:] if not line.startswith("signature")),
         encoding="utf-8",
         newline="\n",
     )
     with pytest.raises(StoreError, match="was changed after it was stamped, or was stamped by another server"):
-        verify_study(study, kept)
+        verify_study(study, proof_copy)
     workstation.save_settings(workstation.load_settings().model_copy(update={"stamp_root": None}))
-    kept.write_text(whole, encoding="utf-8", newline="\n")
+    proof_copy.write_text(whole, encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match=r"has a time stamp: to verify it, specify the server's root certificate"):
-        verify_study(study, kept)
+        verify_study(study, proof_copy)
 
 
-def test_no_proof_is_written_unless_the_settings_name_a_folder(study: Path) -> None:
+def test_proofs_are_written_only_if_the_settings_name_a_folder(study: Path) -> None:
     write_proof(StudyFolder(study), pytest.fail)
     wait_for_proofs()
 
 
-def test_a_server_that_gives_no_stamp_is_named_and_the_program_goes_on(study: Path, tmp_path: Path) -> None:
+def test_a_server_without_a_time_stamp_is_named_and_the_program_continues(study: Path, tmp_path: Path) -> None:
     pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
     workstation.save_settings(workstation.MachineSettings(proofs=str(tmp_path), stamps="http://127.0.0.1:9"))
-    said: list[str] = []
-    write_proof(StudyFolder(study), said.append)
+    messages: list[str] = []
+    write_proof(StudyFolder(study), messages.append)
     wait_for_proofs()
-    (line,) = said
+    (line,) = messages
     assert re.search(
         (
             r"proof.txt: http://127.0.0.1:9 did not return a time stamp \(.*refused.*\): try again "
@@ -258,7 +259,7 @@ def test_a_server_that_gives_no_stamp_is_named_and_the_program_goes_on(study: Pa
     ],
     ids=["rejection", "no token", "HTML", "redirect"],
 )
-def test_an_answer_that_grants_no_stamp_is_refused_at_once(
+def test_a_rejected_time_stamp_request_fails_at_once(
     study: Path, status: int, headers: dict[str, str], answer: bytes, reason: str
 ) -> None:
     pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
@@ -278,10 +279,10 @@ def test_an_answer_that_grants_no_stamp_is_refused_at_once(
     with ThreadingHTTPServer(("127.0.0.1", 0), Refuses) as serving:
         threading.Thread(target=serving.serve_forever).start()
         port = serving.server_address[1]
-        with pytest.raises(StoreError) as refused:
+        with pytest.raises(StoreError) as error:
             time_stamps.request_stamp("a line\n", f"http://127.0.0.1:{port}/")
         serving.shutdown()
-    assert re.match(rf"http://127.0.0.1:{port}/ did not return a time stamp \(.*{reason}", str(refused.value))
+    assert re.match(rf"http://127.0.0.1:{port}/ did not return a time stamp \(.*{reason}", str(error.value))
 
 
 def test_a_message_shows_no_login_of_a_server() -> None:
@@ -301,15 +302,17 @@ def test_a_stamp_of_another_request_is_refused(study: Path, server: str, monkeyp
         time_stamps.check_granted(old, other)
 
 
-def test_no_other_program_in_place_of_a_server_of_stamps_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_program_does_not_wait_for_a_server_that_is_not_a_time_stamp_server(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
     monkeypatch.setattr(time_stamps, "WAITS_S", 1.0)
 
     def client(port: int) -> str:
-        with pytest.raises(StoreError) as refused:
+        with pytest.raises(StoreError) as error:
             time_stamps.request_stamp("a line\n", f"http://127.0.0.1:{port}/")
-        return str(refused.value)
+        return str(error.value)
 
-    said = ends_with_each(client)
+    messages = ends_with_each(client)
     line = r"http://127.0.0.1:\d+/ did not return a time stamp \([^\n]{1,200}\): try again later$"
-    assert [one for one in said.items() if not re.match(line, one[1])] == []
+    assert [outcome for outcome in messages.items() if not re.match(line, outcome[1])] == []

@@ -20,15 +20,15 @@ KEY: Any = SimpleNamespace(hash="a" * 64)
 RESTORE = "restore it from a backup"
 
 
-def told(findings: Iterable[Finding]) -> list[str]:
+def finding_texts(findings: Iterable[Finding]) -> list[str]:
     return [str(finding) for finding in findings]
 
 
 def write_receipt(study: StudyFolder, participant: str, session: int = 1, journal: bytes = b"", **fields: Any) -> None:
     folder = study.session(participant, session)
     folder.path.mkdir(parents=True)
-    held = {"key_hash": "a" * 64, "protocol_hash": "c" * 64, "started_at": AT} | fields
-    folder.receipt.write_text(json.dumps(held), encoding="utf-8", newline="\n")
+    field_values = {"key_hash": "a" * 64, "protocol_hash": "c" * 64, "started_at": AT} | fields
+    folder.receipt.write_text(json.dumps(field_values), encoding="utf-8", newline="\n")
     if journal:
         folder.journal.write_bytes(journal)
 
@@ -41,12 +41,17 @@ def test_findings_name_paths_in_the_folder_without_repeating_them(tmp_path: Path
     with findings.reading(tmp_path / "c"):
         raise whole_study.StoreError(f"{tmp_path / 'c'}: cannot be read")
     findings.warning(tmp_path.parent / "d", "is outside")
-    assert told(findings.errors) == ["data/a.csv: is wrong", ".: is wrong", "b: line 3 is wrong", "c: cannot be read"]
-    assert (told(findings.warnings), findings.is_sound) == ([".: is outside"], False)
+    assert finding_texts(findings.errors) == [
+        "data/a.csv: is wrong",
+        ".: is wrong",
+        "b: line 3 is wrong",
+        "c: cannot be read",
+    ]
+    assert (finding_texts(findings.warnings), findings.is_sound) == ([".: is outside"], False)
     others = Findings(tmp_path, warnings=(Finding("x", "y", shares=True),))
     assert others.is_sound
     others.extend(findings)
-    assert (len(others.errors), told(others.warnings)) == (4, ["x: y", ".: is outside"])
+    assert (len(others.errors), finding_texts(others.warnings)) == (4, ["x: y", ".: is outside"])
 
 
 def test_one_version_with_two_contents_of_the_studys_file_is_reported(tmp_path: Path) -> None:
@@ -57,7 +62,7 @@ def test_one_version_with_two_contents_of_the_studys_file_is_reported(tmp_path: 
     assert findings.warnings == ()
     write_receipt(study, "P4", protocol_hash="e" * 64, protocol={"study": {"version": "1.1"}})
     whole_study._check_contents(study, findings)
-    assert told(findings.warnings) == [
+    assert finding_texts(findings.warnings) == [
         "data: sessions with version 1.1 used 2 different study files (see protocol_hash): change study.version "
         "whenever the file changes"
     ]
@@ -73,13 +78,13 @@ def test_plug_ins_that_are_missing_are_named_with_their_package(tmp_path: Path) 
     write_receipt(study, "P1", plug_ins=plug_ins)
     whole_study._check_plug_ins(study, findings)
     assert findings.plug_ins == {"oils 1.2": ["method ladder", "outlet udp", "task reach", "task swirl"]}
-    assert told(findings.warnings) == [
+    assert finding_texts(findings.warnings) == [
         "data: sessions used method ladder, task swirl of oils 1.2, which is not installed: checks that need the "
         "plug-in were skipped"
     ]
 
 
-def test_a_copy_of_a_list_is_told_from_other_files(tmp_path: Path) -> None:
+def test_a_copy_of_a_list_is_distinguished_from_other_files(tmp_path: Path) -> None:
     study = StudyFolder(tmp_path)
     table = study.participants("stirring")
     table.parent.mkdir()
@@ -131,11 +136,11 @@ def test_each_entry_belongs_to_one_participant_with_a_session(tmp_path: Path, mo
         claim(9, "P9"), claim(2, "P7", "P1"), claim(1, "P4", "P0"),
     ]  # fmt: skip
     findings = findings_of_allocation(study, monkeypatch, [*sound, *others], recorded, ("P9", "P7", "P4", "P6"))
-    assert told(findings.warnings) == [
+    assert finding_texts(findings.warnings) == [
         f"{where}/004.json: was reserved by a program that ended early; it will remain unused",
         f"{where}/008.json: belongs to participant P8, who does not have a session yet",
     ]
-    assert told(findings.errors) == [
+    assert finding_texts(findings.errors) == [
         f"{where}/005.json: has been changed: {RESTORE}",
         f"{where}/006.json: has been changed: {RESTORE}",
         f"{where}/007.json: is a second entry for participant P2, who already has entry 002",
@@ -145,7 +150,7 @@ def test_each_entry_belongs_to_one_participant_with_a_session(tmp_path: Path, mo
     elsewhere = recorded | {"P2": RecordedEntry(1, None, None), "P3": RecordedEntry(30, "experts", None)}
     elsewhere |= {"P5": RecordedEntry(1, None, "P2")}
     shared = "entry 1 of participant {} also belongs to another participant"
-    assert told(findings_of_allocation(study, monkeypatch, sound, elsewhere).errors) == [
+    assert finding_texts(findings_of_allocation(study, monkeypatch, sound, elsewhere).errors) == [
         f"{where}: {shared.format('P1')}",
         f"{where}/001-P5.json: does not belong to participant P5, whose journal has entry 1",
         f"{where}/001.json: does not belong to participant P2, whose journal has entry 1",
@@ -157,7 +162,7 @@ def test_each_entry_belongs_to_one_participant_with_a_session(tmp_path: Path, mo
     assert findings.errors == (), "without the key nothing can be compared"
 
 
-def test_a_withdrawal_that_left_files_is_told_from_a_complete_one(tmp_path: Path) -> None:
+def test_an_incomplete_withdrawal_is_distinguished_from_a_complete_one(tmp_path: Path) -> None:
     study, findings = StudyFolder(tmp_path), Findings(tmp_path)
     for participant, by in (("P1", "AB"), ("P2", "CD")):
         add_tombstone(study, Tombstone(participant=participant, at=AT, by=by, reason="asked", sessions=()))
@@ -165,10 +170,10 @@ def test_a_withdrawal_that_left_files_is_told_from_a_complete_one(tmp_path: Path
     left.mkdir(parents=True)
     withdrawn, unerased = whole_study._check_withdrawals(study, findings)
     assert (list(withdrawn), unerased) == (["P1", "P2"], {left.parent})
-    assert told(findings.warnings) == [
+    assert finding_texts(findings.warnings) == [
         f"withdrawals.jsonl: participant P1 withdrew at {AT} (recorded by AB); the data were erased"
     ]
-    assert told(findings.errors) == [
+    assert finding_texts(findings.errors) == [
         "data/sub-P2: still exists, although P2 withdrew; the withdrawal was interrupted: run liquid-study withdraw "
         "again"
     ]
@@ -184,12 +189,12 @@ def test_each_reveal_is_a_record_of_this_key(tmp_path: Path) -> None:
     lines = [json.dumps(records[0]), '{"by": 7}', json.dumps(records[1]), json.dumps(records[2]), '{"at": "2026']
     study.reveals.write_text("\n".join(lines), encoding="utf-8", newline="\n")
     whole_study._check_reveals(study, KEY, findings)
-    assert told(findings.errors) == [
+    assert finding_texts(findings.errors) == [
         "blinding/reveals.jsonl: line 2 is not a record of an unblinding: it has been changed; restore the file from a "
         "backup",
         "blinding/reveals.jsonl: unblinding 2 used a different key",
     ]
-    assert told(findings.warnings) == [
+    assert finding_texts(findings.warnings) == [
         "blinding/reveals.jsonl: line 5 is an incomplete record of an unblinding (possibly because of a power failure)"
     ]
 
@@ -219,12 +224,12 @@ def test_only_sessions_withdrawn_after_the_merge_may_be_missing_at_a_site(
         erased = ErasedSession(session=1, begun="", checksums="", fingerprint="")
         add_tombstone(study, Tombstone(participant=f"Q{number}", at=at, by="AB", reason="asked", sessions=(erased,)))
     whole_study._check_site(merged.Merged(tmp_path, "stirring", "c" * 64, (site,)), site, findings)
-    said = f"contains only {present} of the 3 sessions that sites.json lists: restore the others from a backup"
-    assert told(findings.errors) == ([f"sites/north: {said}"] if is_missing else [])
+    message = f"contains only {present} of the 3 sessions that sites.json lists: restore the others from a backup"
+    assert finding_texts(findings.errors) == ([f"sites/north: {message}"] if is_missing else [])
     study.description.write_text('{"name": "shaking"}', encoding="utf-8", newline="\n")
     whole_study._check_site(merged.Merged(tmp_path, "stirring", "c" * 64, (site,)), site, findings)
-    said = "sites/north: contains study shaking, but sites.json lists the sites of stirring"
-    assert said in told(findings.errors)
+    message = "sites/north: contains study shaking, but sites.json lists the sites of stirring"
+    assert message in finding_texts(findings.errors)
 
 
 def test_sites_are_compared_with_their_list_and_with_each_other(
@@ -241,10 +246,10 @@ def test_sites_are_compared_with_their_list_and_with_each_other(
     monkeypatch.setattr(whole_study, "sealed_hash", lambda _folder: "a" * 64)
     whole_study._check_sites(study, findings)
     key = StudyFolder(study.folder("south")).key.relative_to(tmp_path).as_posix()
-    assert told(findings.errors) == [
+    assert finding_texts(findings.errors) == [
         f"{key}: is not the key that site south was merged with: {RESTORE}",
         f"sites/south/data/sub-P2/ses-01/receipt.json: has protocol {'d' * 64}, but was merged with {'c' * 64}",
         "sites/south/data/sub-P2/ses-01: is a copy of sites/north/data/sub-P1/ses-01: its data are counted twice",
         f"sites/west: is missing, although sites.json lists site west: {RESTORE}",
     ]
-    assert told(findings.warnings) == ["sites/east: is not listed as a site in sites.json, so it is ignored"]
+    assert finding_texts(findings.warnings) == ["sites/east: is not listed as a site in sites.json, so it is ignored"]

@@ -13,7 +13,7 @@ FILES = every(Path(__file__).parent / "transcripts", "blinding forgeries journal
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def made_studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: make(tmp_path_factory.mktemp(name) / "study") for name, make in STARTS.items()}
 
 
@@ -21,5 +21,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 @pytest.mark.parametrize(
     "file", [pytest.param(file, marks=[needs_links] * (file.stem == "links"), id=file.stem) for file in FILES]
 )
-def test_what_is_found(file: Path, made: dict[str, Path], tmp_path: Path, pytestconfig: pytest.Config) -> None:
-    compare(file, played(file, player(made, tmp_path)), pytestconfig)
+def test_verification_finds_the_recorded_changes(
+    file: Path, made_studies: dict[str, Path], tmp_path: Path, pytestconfig: pytest.Config
+) -> None:
+    compare(file, played(file, player(made_studies, tmp_path)), pytestconfig)

@@ -17,6 +17,7 @@ from study_app.store.blinded import blinding
 from study_app.store.files.folders import StudyFolder
 from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.journals import journal_events
+from study_app.store.sessions import rebuild_session
 from study_app.store.sessions.open_session import Place
 from study_app.store.verification import Discrepancy, session_discrepancies, verify_session
 from study_app.store.verification.whole_study import verify_study
@@ -29,29 +30,29 @@ pytestmark = pytest.mark.slow
 
 
 def test_the_questions_of_designs_are_compared_unless_a_language_is_the_labs_own() -> None:
-    asked = {"after": {}, f"pairs{receipt.ANSWER}": {}}
-    for languages, compared in ((["nl", "en"], asked), (["en", "fy"], {"after": {}})):
-        protocol = {"study": {"languages": languages}, "questionnaires": asked}
+    questions = {"after": {}, f"pairs{receipt.ANSWER}": {}}
+    for languages, compared in ((["nl", "en"], questions), (["en", "fy"], {"after": {}})):
+        protocol = {"study": {"languages": languages}, "questionnaires": questions}
         assert verify_session._without_own_texts(protocol)["questionnaires"] == compared
 
 
-def test_a_condition_that_is_told_is_found_but_not_repeated(study: Path, tmp_path: Path, start: Start) -> None:
+def test_a_revealed_condition_is_reported_without_naming_it(study: Path, tmp_path: Path, start: Start) -> None:
     store = start("P009")
     store.append(journal_events.Note(kind="note", text="this must be mildew"))
     store.append(journal_events.Note(kind="note", text="density 1013.7, I think"))
     store.append(journal_events.Note(kind="note", text="137 seconds"))
     store.finish("completed")
-    found = [line for line in warned(verify_study(study)).splitlines() if "reveals a condition" in line]
+    reveal_lines = [line for line in warned(verify_study(study)).splitlines() if "reveals a condition" in line]
     place = "data/sub-P009/ses-01/journal.jsonl"
-    assert [line.split(", line ")[1][0] for line in found] == ["2", "3"]
-    assert all(place in line for line in found)
+    assert [line.split(", line ")[1][0] for line in reveal_lines] == ["2", "3"]
+    assert all(place in line for line in reveal_lines)
     assert "mildew" not in warned(verify_study(study))
     blinding.reveal(study, "AB", "done")
     assert "reveals a condition" not in warned(verify_study(study))
 
 
 def test_a_receipt_without_a_protocol_makes_no_word_of_the_study_a_telltale(study: Path) -> None:
-    """A liquid may be called as a column or a page is; that stands in every receipt's protocol."""
+    """A liquid may have the name of a column or a page, which every receipt's protocol contains."""
     key = study / "blinding" / "key.sealed"
     content = json.loads(base64.b64decode(key.read_bytes()))
     content["tables"]["liquids"]["Settings"] = content["tables"]["liquids"].pop("mildew")
@@ -84,32 +85,32 @@ def test_each_difference_from_a_list_of_fingerprints_names_its_session(study: Pa
         copy.write_text("\n".join([*kept, ""]), encoding="utf-8", newline="\n")
         return [str(error) for error in verify_study(study, copy).errors]
 
-    listed = [first, second]
+    entries = [first, second]
     assert first.endswith(f"  {P007}")
-    assert errors(own=listed, kept=listed) == []
-    assert errors(own=listed, kept=[second]) == [
+    assert errors(own=entries, kept=entries) == []
+    assert errors(own=entries, kept=[second]) == [
         f"{P007}: (fingerprint {proof}) is not in {copy}: the session was added or ended after that copy was made"
     ]
-    assert errors(own=listed, kept=[forged, second, missing, record]) == [
+    assert errors(own=entries, kept=[forged, second, missing, record]) == [
         f"exclusions.csv: does not contain dddd-eeee-ffff (exclusions.csv/sub-P007), although {copy} lists it: it was "
         "deleted or changed",
         f"{begins}{copy} lists as cccc-bbbb-aaaa: it has been changed (its fingerprint is {proof})",
         f"data/sub-P009/ses-01: is missing, but {copy} lists it: the session was deleted after it had ended",
     ]
-    assert errors(own=[first, "P008"], kept=listed) == [
+    assert errors(own=[first, "P008"], kept=entries) == [
         "fingerprints.txt: line 2 is not a fingerprint: restore it from a backup",
         "fingerprints.txt: does not list data/sub-P008/ses-01, which has ended; the rebuild command adds it",
     ]
-    assert errors(own=[forged, second], kept=listed) == [
+    assert errors(own=[forged, second], kept=entries) == [
         f"{begins}fingerprints.txt lists as cccc-bbbb-aaaa: it has been changed (its fingerprint is {proof})"
     ]
     with lock_folder(study):
-        assert errors(own=[first], kept=listed) == [], "a program lists a session just after creating it"
+        assert errors(own=[first], kept=entries) == [], "a program lists a session just after creating it"
     assert other != proof
 
 
-def test_nothing_of_the_key_is_shown(study: Path) -> None:
-    """Whatever is broken, no sentence tells a condition."""
+def test_findings_do_not_reveal_the_key(study: Path) -> None:
+    """No message reveals a condition, whatever is damaged."""
     content = json.loads(base64.b64decode((study / "blinding" / "key.sealed").read_bytes()))
     for path in sorted(study.rglob("*")):
         if path.is_file() and path.name != "key.sealed":
@@ -117,10 +118,10 @@ def test_nothing_of_the_key_is_shown(study: Path) -> None:
     try:
         findings = verify_study(study)
     except StoreError as error:
-        shown = str(error)
+        message = str(error)
     else:
-        shown = told(findings) + warned(findings)
-    assert not [word for word in content["tables"]["conditions"] if word in shown]
+        message = told(findings) + warned(findings)
+    assert not [word for word in content["tables"]["conditions"] if word in message]
 
 
 def test_another_description_of_a_column_is_a_warning_and_another_range_an_error(study: Path) -> None:
@@ -151,28 +152,28 @@ def test_a_column_that_was_removed_from_a_table_is_found(study: Path) -> None:
 
 def test_each_difference_of_a_receipt_and_a_recording_from_the_journal_is_named(study: Path) -> None:
     session = study / P007
-    path, held = session / "receipt.json", receipt.read(session / "receipt.json")
-    blocks = held["protocol"]["blocks"]
+    path, start_receipt = session / "receipt.json", receipt.read(session / "receipt.json")
+    blocks = start_receipt["protocol"]["blocks"]
     name, block = next((name, block) for name, block in blocks.items() if len(block["codes"]) > 1)
 
     def errors(**changes: object) -> set[str]:
-        receipt.write(path, held | changes)
+        receipt.write(path, start_receipt | changes)
         return {line.partition(": ")[2] for line in told(verify_study(study)).splitlines() if path.name in line}
 
     changed = "has changed since the session ended (its checksum differs)"
     settings = "differs from the journal in the settings used when the session began"
     assert errors() == set()
     for codes in (block["codes"][::-1], ["Z9"]):  # in another order, and one that the key does not have
-        protocol = held["protocol"] | {"blocks": blocks | {name: block | {"codes": codes}}}
+        protocol = start_receipt["protocol"] | {"blocks": blocks | {name: block | {"codes": codes}}}
         assert errors(protocol=protocol) == {
             changed, settings, "its protocol has been changed: restore it from a backup",
         }  # fmt: skip
     assert errors(seed=9, operator="XY", key_hash="ab" * 32) == {
         changed, "contains the hash of a different key", "differs from the journal in seed, operator, key_hash",
     }  # fmt: skip
-    assert errors(device=held["device"] | {"name": "mouse"}) == {changed, "differs from the journal in device"}
+    assert errors(device=start_receipt["device"] | {"name": "mouse"}) == {changed, "differs from the journal in device"}
     assert errors(row_of="P001", group="g") == {changed, "differs from the journal in row_of, group"}
-    receipt.write(path, held)
+    receipt.write(path, start_receipt)
     first, second = (session / "recordings" / f"trial-00{trial}.parquet" for trial in (1, 3))
     contents = first.read_bytes(), second.read_bytes()
     first.write_bytes(contents[1])
@@ -187,7 +188,7 @@ def test_each_difference_of_a_receipt_and_a_recording_from_the_journal_is_named(
             assert f"{P007}/recordings/{recording.name}: {sentence}" in findings
 
 
-def test_an_analysis_is_told_each_file_of_a_session_that_differs_once_with_its_remedy(study: Path) -> None:
+def test_an_analysis_lists_each_differing_file_once_with_its_remedy(study: Path) -> None:
     place = Place(StudyFolder(study), StudyFolder(study).session("P007", 1), "brackish")
     table = place.folder.table("brackish", "trials")
     advice = f"run liquid-study verify {study} to check everything"
@@ -202,7 +203,7 @@ def test_an_analysis_is_told_each_file_of_a_session_that_differs_once_with_its_r
         place.folder.rebuilt, "states that the checksums or the fingerprint were rewritten after the session ended",
     )  # fmt: skip
     assert first.remedy.startswith("compare it with fingerprints stored elsewhere: liquid-study verify --fingerprints")
-    assert {(each.path, each.remedy) for each in others} == {(table, advice), (place.folder.rebuilt, advice)}
+    assert {(doubt.path, doubt.remedy) for doubt in others} == {(table, advice), (place.folder.rebuilt, advice)}
     with lock_folder(place.folder.path):
         assert session_discrepancies(place) == ()
 
@@ -214,16 +215,30 @@ def rehearse_short(study: Path, protocol: Path, _enough: Any) -> None:
     rehearse(protocol, participants=1, seed=7, results=study)
 
 
+def test_a_missing_description_is_an_error_that_rebuild_corrects(study: Path) -> None:
+    path = study / "dataset_description.json"
+    content = path.read_bytes()
+    path.unlink()
+    findings = verify_study(study)
+    assert findings.sessions
+    assert f"{path.name}: is missing; the rebuild command creates it" in told(findings)
+    assert path in rebuild_session(StudyFolder(study).sessions()[0].path).rewritten
+    assert path.read_bytes() == content
+    assert verify_study(study).is_sound
+
+
 def look_beside(study: Path, *programs: tuple[Callable[..., None], tuple[Any, ...]]) -> tuple[int, int, list[str]]:
     """Verify until the programs have ended; return how often, how often a session ran, and every error."""
     forking = multiprocessing.get_context("fork")
     enough = forking.Event()
-    started = [forking.Process(target=target, args=(study, *given, enough)) for target, given in programs]
-    for program in started:
+    programs_running = [
+        forking.Process(target=target, args=(study, *arguments, enough)) for target, arguments in programs
+    ]
+    for program in programs_running:
         program.start()
     looks = running = 0
     errors: list[str] = []
-    while any(program.is_alive() for program in started):
+    while any(program.is_alive() for program in programs_running):
         if (study / "dataset_description.json").exists():
             findings = verify_study(study)
             looks += 1
@@ -231,7 +246,7 @@ def look_beside(study: Path, *programs: tuple[Callable[..., None], tuple[Any, ..
             if running >= ENOUGH:
                 enough.set()
             errors += map(str, findings.errors)
-    assert [program.exitcode for program in started] == [0] * len(started)
+    assert [program.exitcode for program in programs_running] == [0] * len(programs_running)
     return looks, running, errors
 
 

@@ -20,11 +20,11 @@ from tests.transcripts import Files
 PARTICIPANTS = NAMES["PARTICIPANTS"]
 
 
-def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
+def test_irregularities_of_a_running_session_are_warnings(study: Path, start: Start) -> None:
     with start("P009", recordings=True) as store:
-        told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+        fields = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
         for trial in (1, 2):
-            store.append(journal_events.TrialStarted(trial=trial, attempt=1, **told_of))
+            store.append(journal_events.TrialStarted(trial=trial, attempt=1, **fields))
         store.append(journal_events.RecordingLost(trial=1, attempt=1, reason="No space left on device"))
         later = {"operator": "AB", "device": "mouse", "version": "99.0"}
         store.append(journal_events.SessionResumed(gap_s=None, torn_bytes=0, **later))
@@ -65,12 +65,12 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
 
 
 @pytest.mark.slow
-def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(study: Path, start: Start) -> None:
-    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+def test_a_recording_in_progress_is_not_reported_as_left_behind(study: Path, start: Start) -> None:
+    fields = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
     store = start("P009", recordings=True)
     store.folder.recordings.mkdir()
     for trial in (1, 2):
-        store.append(journal_events.TrialStarted(trial=trial, attempt=1, **told_of))
+        store.append(journal_events.TrialStarted(trial=trial, attempt=1, **fields))
     (store.folder.recordings / ".trial-002.parquet.0123abcd.tmp").touch()
     (store.folder.recordings / "trial-001.parquet").write_bytes(b"PAR1")
     place = "data/sub-P009/ses-01"
@@ -93,10 +93,10 @@ def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(study: 
 def test_a_session_that_a_program_opens_while_it_is_checked_is_checked_again_as_running(
     study: Path, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store, asked = start("P009"), list[Path]()
+    store, paths = start("P009"), list[Path]()
     store.folder.table("brackish", "responses").write_text("a,b\n1,2\n", encoding="utf-8", newline="\n")
     monkeypatch.setattr(
-        verify_session, "is_open", lambda path: is_open(path) and (asked.append(path) or len(asked) > 1)
+        verify_session, "is_open", lambda path: is_open(path) and (paths.append(path) or len(paths) > 1)
     )
     findings = verify_study(study)
     assert (told(findings), "sub-P009/ses-01: is open in another program" in warned(findings)) == ("", True)
@@ -109,10 +109,10 @@ def test_a_session_that_a_program_opens_while_it_is_checked_is_checked_again_as_
 def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     study: Path, start: Start, summary: dict[str, Any]
 ) -> None:
-    """Its program was killed before it wrote them; those of the others may not."""
-    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    """Its program was killed before writing them; tables of other sessions must exist."""
+    fields = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
     with start("P000") as store:
-        store.append(journal_events.TrialStarted(trial=1, attempt=1, **told_of))
+        store.append(journal_events.TrialStarted(trial=1, attempt=1, **fields))
         store.append(event_of("trial_ended", trial=1, attempt=1, outcome="complete", **summary))
     findings = verify_study(study)
     assert findings.errors == ()
@@ -133,15 +133,15 @@ def test_every_change_to_the_receipt_of_a_session_that_has_not_ended_is_an_error
         path.parent, protocol, SOURCE, operator="AB", device={"name": "mouse", "rate_hz": 9}, screens={}
     ).close()
     assert told(verify_study(study)) == ""
-    held = receipt.read(path)
-    (again,) = held["resumed"]
-    changes = [{name: value | {"rate_hz": 5}} for name, value in held.items() if isinstance(value, dict)]
-    changes += [{name: f"{value}x"} for name, value in held.items() if isinstance(value, str)]
+    session_receipt = receipt.read(path)
+    (again,) = session_receipt["resumed"]
+    changes = [{name: value | {"rate_hz": 5}} for name, value in session_receipt.items() if isinstance(value, dict)]
+    changes += [{name: f"{value}x"} for name, value in session_receipt.items() if isinstance(value, str)]
     changes += [{"resumed": [again | {"device": {"name": "mouse"}}]}, {"resumed": [again | {"at": [3]}]}, {"new": 1}]
     for change in changes:
-        receipt.write(path, held | change)
+        receipt.write(path, session_receipt | change)
         assert "sub-P009/ses-01/receipt.json: " in told(verify_study(study)), change
-    receipt.write(path, held | {"resumed": []})  # so does a program leave it that is killed while it resumes
+    receipt.write(path, session_receipt | {"resumed": []})  # so does a program leave it that is killed while it resumes
     assert "sub-P009/ses-01/receipt.json: does not contain the settings used when the session was resumed" in warned(
         verify_study(study)
     )

@@ -36,7 +36,7 @@ PERSON = "P002"
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def finished_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a study of three finished sessions, to be copied."""
     folder = rehearsed(tmp_path_factory.mktemp("made"))
     exclude(folder, PERSON, 1, trial=2, by="AK", reason="the phone of P002 rang")
@@ -46,8 +46,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def study(made: Path, results: Path) -> Path:
-    return Path(shutil.copytree(made, results / made.name))
+def study(finished_study: Path, results: Path) -> Path:
+    return Path(shutil.copytree(finished_study, results / finished_study.name))
 
 
 def erase(study: Path, **given: object) -> Withdrawn:
@@ -59,7 +59,7 @@ def run(*words: object) -> Result:
 
 
 def personal(study: Path) -> set[bytes]:
-    """Return what occurs in this person's files and in no other's: hashes, moments, seeds, names of files."""
+    """Return the texts that occur only in this person's files: hashes, times, seeds, file names."""
     session = study / "data" / f"sub-{PERSON}"
     words = re.compile(rb"[0-9A-Za-z][0-9A-Za-z:.+_-]{7,}")
     own, other = set(), set()
@@ -73,7 +73,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name not in left_out}
 
 
-def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, results: Path) -> None:
+def test_a_withdrawal_erases_every_byte_of_the_person_and_keeps_the_study_sound(study: Path, results: Path) -> None:
     own = personal(study)
     assert len(own) > 30
     unblind(study, "AK", "closed")
@@ -81,12 +81,12 @@ def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, resul
     report(study, study / "report")
     copy = study.parent / "fingerprints-kept.txt"
     shutil.copy(study / "fingerprints.txt", copy)
-    done = erase(study)
+    withdrawal = erase(study)
     copy = copy.rename(results.parent / "fingerprints-kept.txt")
     with copy.open("a", encoding="utf-8", newline="\n") as kept:
-        kept.write(checked_line(*proof_of_withdrawal(done.tombstone)))
-    assert done.left == ()
-    assert done.elsewhere == ()
+        kept.write(checked_line(*proof_of_withdrawal(withdrawal.tombstone)))
+    assert withdrawal.left == ()
+    assert withdrawal.elsewhere == ()
     for path, content in contents(results).items():
         assert PERSON.encode() not in content, path
         assert PERSON not in str(path)
@@ -101,17 +101,22 @@ def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, resul
 
 def test_the_tombstone_proves_which_session_was_erased(study: Path) -> None:
     session = study / "data" / f"sub-{PERSON}" / "ses-01"
-    listed = (study / "fingerprints.txt").read_text("utf-8")
+    content = (study / "fingerprints.txt").read_text("utf-8")
     sums = hashlib.sha256((session / "checksums.sha256").read_bytes()).hexdigest()
     first = (session / "journal.jsonl").read_bytes().splitlines(keepends=True)[0]
     erase(study)
     (line,) = (study / "withdrawals.jsonl").read_text("utf-8").splitlines()
-    held = json.loads(line)
-    (erased,) = held.pop("sessions")
-    assert held == {"participant": PERSON, "at": "2026-11-22T09:30:00+00:00", "by": "AK", "reason": "asked by letter"}
+    json_content = json.loads(line)
+    (erased,) = json_content.pop("sessions")
+    assert json_content == {
+        "participant": PERSON,
+        "at": "2026-11-22T09:30:00+00:00",
+        "by": "AK",
+        "reason": "asked by letter",
+    }
     assert erased["checksums"] == sums
     assert erased["begun"] == hashlib.sha256(first).hexdigest()
-    assert f"{erased['fingerprint']}  data/sub-{PERSON}/ses-01\n" in listed
+    assert f"{erased['fingerprint']}  data/sub-{PERSON}/ses-01\n" in content
     assert PERSON not in (study / "fingerprints.txt").read_text("utf-8")
     with pytest.raises(StoreError, match=r"participant p002 withdrew, .* \(next free: P004\)"):
         used_ids(StudyFolder(study)).check_unused("p002", 1)
@@ -131,8 +136,8 @@ def test_a_killed_withdrawal_is_reported_and_finished_by_the_same_command(
         assert forked(lambda: erase(study)) == -signal.SIGKILL
     wrong = verify_study(study)
     assert "was interrupted: run liquid-study withdraw again" in "\n".join(map(str, wrong.errors))
-    done = erase(study, by="BM", reason="again")
-    assert done.folders == (study,)
+    withdrawal = erase(study, by="BM", reason="again")
+    assert withdrawal.folders == (study,)
     assert tombstones(StudyFolder(study))[PERSON].by == "AK"
     assert verify_study(study).is_sound
     again = erase(study)
@@ -140,8 +145,8 @@ def test_a_killed_withdrawal_is_reported_and_finished_by_the_same_command(
     for path in (study / "exclusions.csv", study / "exclusions_reversed.jsonl", *study.glob("data/*.csv")):
         erased = path.read_bytes()
         path.write_bytes(before[path])
-        told = "\n".join(map(str, verify_study(study).errors))
-        assert f"{path.name}: still lists {PERSON}, although {PERSON} withdrew" in told
+        errors_text = "\n".join(map(str, verify_study(study).errors))
+        assert f"{path.name}: still lists {PERSON}, although {PERSON} withdrew" in errors_text
         path.write_bytes(erased)
 
 
@@ -150,8 +155,8 @@ def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, resul
     shared = tmp_path / "disk" / "shared"
     export(study, tmp_path / "out", extras=["psych-ds"])
     shutil.move(tmp_path / "out" / "psych-ds", shared)
-    by_chance, named = (tmp_path / "disk" / name for name in ("by chance", "named"))
-    for folder, where in ((by_chance, "materials/honey.mp4"), (named, "results/report.txt")):
+    by_chance, named_folder = (tmp_path / "disk" / name for name in ("by chance", "named"))
+    for folder, where in ((by_chance, "materials/honey.mp4"), (named_folder, "results/report.txt")):
         (folder / "data").mkdir(parents=True)
         shutil.copy(shared / "dataset_description.json", folder)
         (folder / where).parent.mkdir()
@@ -161,10 +166,11 @@ def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, resul
     (foreign / "dataset_description.json").write_text('{"Name": "of another program"}', encoding="utf-8", newline="\n")
     export(study, results / "tables", extras=["psych-ds"])  # deleted, since this machine wrote it there
     before = contents(shared)
-    done = erase(study, also=[tmp_path])
-    assert done.folders == (study,)
-    assert done.left == tuple(
-        f"{one} is an export that contains data from {PERSON}: delete it and create it again" for one in (named, shared)
+    withdrawal = erase(study, also=[tmp_path])
+    assert withdrawal.folders == (study,)
+    assert withdrawal.left == tuple(
+        f"{copy} is an export that contains data from {PERSON}: delete it and create it again"
+        for copy in (named_folder, shared)
     )
     assert contents(shared) == before
 
@@ -186,34 +192,36 @@ def test_every_copy_and_output_in_the_workspace_is_erased_without_being_named(st
     (others / "answers.csv").write_text(f"study,participant\nanother,{PERSON}\n", encoding="utf-8", newline="\n")
     archive = Path(shutil.make_archive(str(results / "before"), "zip", study))
 
-    done = erase(pooled / "sites" / "A")
+    withdrawal = erase(pooled / "sites" / "A")
 
-    assert set(done.folders) == {pooled / "sites" / "A", study, saved}
+    assert set(withdrawal.folders) == {pooled / "sites" / "A", study, saved}
     assert not [path for path in results.parent.rglob(f"sub-{PERSON}") if not path.is_relative_to(other)]
-    assert results.parent / "report" / "report.html" in done.outputs
+    assert results.parent / "report" / "report.html" in withdrawal.outputs
     copied = [path for path in tables.rglob("*") if PERSON in path.read_text("utf-8", errors="replace")]
     assert {path.name for path in copied} >= {"report.html", "study-demo_description-responses_data.csv"}
-    assert set(done.left) == {
+    assert set(withdrawal.left) == {
         *(f"{path} still names {PERSON}" for path in (*notes, *copied)),
         f"{archive} is an archive, which is not searched: delete it if it contains data from {PERSON}",
     }
-    assert done.elsewhere == ()
+    assert withdrawal.elsewhere == ()
     assert contents(other) == unrelated
     assert verify_study(pooled).is_sound
 
 
-def test_two_sessions_that_both_lost_their_journals_are_no_copies_of_each_other(study: Path, results: Path) -> None:
-    """The other study's person happens to have the same ID; only the first line tells whose a session is."""
+def test_sessions_without_journals_are_not_taken_for_copies_of_each_other(study: Path, results: Path) -> None:
+    """A participant of another study has the same ID, and only the first journal line identifies a session."""
     other = results / "another"
     with begun(other, PERSON) as store:
         store.finish("completed")
     for folder in (study, other):
         StudyFolder(folder).session(PERSON, 1).journal.write_bytes(b"")
     before = contents(other)
-    told = f"{other} was not changed, because its session {store.folder.path} is not a copy of an erased session"
+    refusal_text = (
+        f"{other} was not changed, because its session {store.folder.path} is not a copy of an erased session"
+    )
     for also in ((), (other,)):
         left = [line for line in erase(study, also=also).left if "was not changed" in line]
-        assert [line.startswith(told) for line in left] == [True] * len(also)
+        assert [line.startswith(refusal_text) for line in left] == [True] * len(also)
     assert contents(other) == before
     assert not (study / "data" / f"sub-{PERSON}").exists()
 

@@ -31,8 +31,8 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         outcomes = {}
         for item, values in answers.single.items():
-            given = values[~np.isnan(values)]
-            count, n = int((given == HIGHEST).sum()), len(given)
+            known = values[~np.isnan(values)]
+            count, n = int((known == HIGHEST).sum()), len(known)
             outcomes[item] = Outcome(
                 test="binomial",
                 n=n,
@@ -50,7 +50,7 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
         return tests, (NotTested("count of lowest answers", "nobody asked for it"),)
 
     def rows(self) -> Iterator[dict[str, object]]:
-        return (verdict_row(self.result, "the highest answer is given", one) for one in self.value)
+        return (verdict_row(self.result, "the highest answer is given", tested_item) for tested_item in self.value)
 
     def section(self) -> Iterator[str]:
         yield from table_of_tests(f"{self.figure_title}, counted", self.result, self.value)
@@ -59,7 +59,9 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
     def figure(self, drawing: Drawing) -> Picture | None:
         def figure(look: Look) -> Sheet:
             sheet = look.sheet(150)
-            sheet.axes(40, 40, 200, 80).bar(range(len(self.value)), [one.outcome.effect or 0.0 for one in self.value])
+            sheet.axes(40, 40, 200, 80).bar(
+                range(len(self.value)), [tested_item.outcome.effect or 0.0 for tested_item in self.value]
+            )
             return sheet
 
         return drawing.picture(self.figure_title, f"{self.figure_title}, as shares.", figure)
@@ -68,6 +70,6 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
         yield f"The highest answers of {self.result.title} were counted."
 
     def answer(self) -> Answer:
-        most = max(self.value, key=lambda one: one.outcome.effect or 0.0)
+        most = max(self.value, key=lambda tested_item: tested_item.outcome.effect or 0.0)
         text = f"Most highest answers: {short_text(self.result, most.item)}."
         return self.make_answer("shown", text)

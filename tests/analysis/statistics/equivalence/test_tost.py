@@ -11,24 +11,24 @@ from study_app.protocol.participants import fewest_participants
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("n", "others"), list(product((5, 12, 24), ((0,), (-1, 0, 1)))))
-def test_where_a_few_notice_strongly_equivalence_is_seldom_shown(n: int, others: tuple[int, ...]) -> None:
+def test_equivalence_is_rarely_shown_if_a_few_notice_strongly(n: int, others: tuple[int, ...]) -> None:
     # One in five answers five points higher: the mean lies on the bound.
     rng = np.random.default_rng(n)
-    shown = 0
+    times_shown = 0
     for _ in range(400):
         strong = rng.random(n) < 0.2
-        found = tost(np.where(strong, 5.0, rng.choice(others, n)), 1.0)
-        shown += found.verdict == "equivalent"
-        assert found.beyond is not None
-        assert found.beyond.count == strong.sum()
-    assert shown <= binom.ppf(0.999, 400, 0.05)
+        result = tost(np.where(strong, 5.0, rng.choice(others, n)), 1.0)
+        times_shown += result.verdict == "equivalent"
+        assert result.beyond is not None
+        assert result.beyond.count == strong.sum()
+    assert times_shown <= binom.ppf(0.999, 400, 0.05)
 
 
 def test_the_bootstrap_counts_a_further_participant_like_the_most_extreme() -> None:
-    """Of one at 5 among zeros and a further one the weight is Beta(2, n − 1): at least q as often as B(n, q) ≤ 1."""
+    """A value of 5 among zeros and a further copy have a weight of Beta(2, n − 1): ≥ q as often as B(n, q) ≤ 1."""
     n, bound = 20, 1.0
-    found = tost([5.0] + [0.0] * (n - 1), bound)
-    assert found.p_bootstrap == pytest.approx(binom.cdf(1, n, bound / 5), abs=0.02)
+    result = tost([5.0] + [0.0] * (n - 1), bound)
+    assert result.p_bootstrap == pytest.approx(binom.cdf(1, n, bound / 5), abs=0.02)
     # Of 2, 1, 0 and a further 2, less 1, the weights of two outweigh that of one in three of four draws.
     assert tost([2.0, 1.0, 0.0], 1.0).p_bootstrap == pytest.approx(0.75, abs=0.03)
 
@@ -52,30 +52,30 @@ def test_the_min_sample_depend_on_the_bound(bound: float, n: int) -> None:
     [(1 / 6, 1.0, 14), (1 / 6, 1.0, 30), (1 / 12, 0.5, 14), (1 / 12, 0.5, 30), (1 / 12, 0.5, 40)],
 )
 @pytest.mark.parametrize("others", [(0,), (-1, 0, 0, 1)])
-def test_a_minority_that_differs_by_the_whole_scale_is_seldom_missed(
+def test_a_minority_that_differs_by_the_whole_scale_is_rarely_missed(
     share: float, bound: float, n: int, others: tuple[int, ...]
 ) -> None:
     rng = np.random.default_rng(n)
-    shown = [
+    are_shown = [
         tost(np.where(rng.random(n) < share, 6.0, rng.choice(others, n)), bound).verdict == "equivalent"
         for _ in range(400)
     ]
-    assert sum(shown) <= binom.ppf(0.999, 400, 0.05)
+    assert sum(are_shown) <= binom.ppf(0.999, 400, 0.05)
 
 
 @pytest.mark.parametrize("bound", [0, -1, np.nan, np.inf])
-def test_a_bound_that_means_nothing_is_refused(bound: float) -> None:
+def test_a_meaningless_equivalence_bound_is_refused(bound: float) -> None:
     with pytest.raises(AnalysisError, match="equivalence bound"):
         tost([1.0, 2.0], bound)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("n", "power"), [(5, 0.02), (20, 0.17), (30, 0.47)])
-def test_published_power_at_no_difference(n: int, power: float) -> None:
+def test_the_power_of_equivalence_without_a_difference_is_as_published(n: int, power: float) -> None:
     # Paired differences of whole answers whose spread is 2.36 points; the bound is 1.
     rng = np.random.default_rng(n)
-    shown = [(tost(rng.normal(0, 2.36, n), 1.0).p or 0.0) <= 0.05 for _ in range(1000)]
-    assert np.mean(shown) == pytest.approx(power, abs=0.05)
+    are_shown = [(tost(rng.normal(0, 2.36, n), 1.0).p or 0.0) <= 0.05 for _ in range(1000)]
+    assert np.mean(are_shown) == pytest.approx(power, abs=0.05)
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from tests.benchmarks.analysis import people, threshold_coverage
 def test_the_interval_of_a_difference_holds_for_people_and_for_stationary_observers(capsys) -> None:
     people.main("2")
     for row in capsys.readouterr().out.splitlines()[1:]:
-        held, wider, stationary = (float(row.split()[at]) for at in (2, -2, -1))
-        assert held >= 90, row
+        coverage, wider, stationary = (float(row.split()[at]) for at in (2, -2, -1))
+        assert coverage >= 90, row
         assert wider <= 1.3, row
         assert stationary >= 93 - 2 * 1.8, row  # of 196 pairs, two standard errors
 
@@ -35,15 +35,15 @@ def test_levels_and_widths_of_others_leave_thresholds_unbiased(width: float, cha
     planted = 0.2 * 1.2 ** draw.normal(size=100)
     person = threshold_coverage.KINDS["as assumed"]._replace(width=width)
     presented = threshold_coverage.answered(threshold_coverage.Case(person), planted, draw, 80)
-    found = [
-        one.threshold for _, *own in threshold_coverage.studies(threshold_coverage.STIMULUS, *presented) for one in own
+    thresholds_found = [
+        fit.threshold for _, *own in threshold_coverage.studies(threshold_coverage.STIMULUS, *presented) for fit in own
     ]
-    assert np.log(found / planted).mean() == pytest.approx(0.0, abs=0.05 + chance)
+    assert np.log(thresholds_found / planted).mean() == pytest.approx(0.0, abs=0.05 + chance)
 
 
 @pytest.mark.slow
-def test_the_threshold_for_many_lapses_is_right_for_people_who_lapse_so_often() -> None:
-    """Levels near the threshold do not show lapses: the estimate is too high, the one for their lapse rate is not."""
+def test_the_threshold_for_many_lapses_is_unbiased_for_frequent_lapses() -> None:
+    """Levels near the threshold do not show lapses: the estimate is too high unless the lapse rate is known."""
     case, draw = threshold_coverage.Case(Person(lapse=2 * MANY_LAPSES)), np.random.default_rng(3)
     presented = threshold_coverage.answered(case, np.full(60, 0.2), draw, 80)
     groups = [group for group, *_ in threshold_coverage.studies(case.stimulus, *presented)]

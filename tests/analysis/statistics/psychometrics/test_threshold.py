@@ -50,10 +50,10 @@ def people_who_notice(rng: np.random.Generator, n: int, spread_ms: float, never:
 )
 def test_the_interval_covers_the_threshold_of_people_who_differ(n: int, spread_ms: float, never: float) -> None:
     rng = np.random.default_rng(3)
-    found = [detection_threshold(people_who_notice(rng, n, spread_ms, never), STUDY).interval for _ in range(40)]
-    printed = [one for one in found if one is not None]
+    intervals = [detection_threshold(people_who_notice(rng, n, spread_ms, never), STUDY).interval for _ in range(40)]
+    printed = [interval for interval in intervals if interval is not None]
     assert len(printed) >= 36
-    covered = sum(one.low <= 120 <= one.high for one in printed)
+    covered = sum(interval.low <= 120 <= interval.high for interval in printed)
     assert covered >= binom.ppf(0.05, len(printed), 0.93)
 
 
@@ -88,7 +88,7 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
         ([5, 4, 3, 2, 1, 0, 0], "the fitted threshold lies outside the range of presented levels"),
     ],
 )
-def test_answers_without_a_threshold_are_told(yes: list[int], note: str) -> None:
+def test_answers_without_a_threshold_are_reported(yes: list[int], note: str) -> None:
     result = detection_threshold(pooled(yes, 5), DELAYS)
     assert (result.effect, result.interval, result.statistic) == (None, None, None)
     assert note in result.note
@@ -127,9 +127,9 @@ def test_deviance_is_that_worked_by_hand_and_0_where_shares_are_as_expected() ->
 @pytest.mark.slow
 def test_p_of_fit_is_uniform_where_the_function_is_true() -> None:
     draw = np.random.default_rng(7)
-    found = np.array([p_of_fit(draw.binomial(N, PSI), N, PSI) for _ in range(400)])
-    assert (found < 0.05).mean() == pytest.approx(0.05, abs=0.035)
-    assert found.mean() == pytest.approx(0.5, abs=0.06)
+    ps = np.array([p_of_fit(draw.binomial(N, PSI), N, PSI) for _ in range(400)])
+    assert (ps < 0.05).mean() == pytest.approx(0.05, abs=0.035)
+    assert ps.mean() == pytest.approx(0.5, abs=0.06)
 
 
 def test_p_of_fit_is_small_where_answers_do_not_follow_the_function_and_the_same_again() -> None:

@@ -11,7 +11,7 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import ChoicePage, EndPage, FeedbackPage, TaskPage
 from study_app.session.replay import replay
 from study_app.store.verification.reproduction import reproduce_session
-from tests.app.people import Person, attended, events, rows, window
+from tests.app.people import Person, events, rows, run_attended, window
 from tests.compiled import needs_servo
 from tests.protocol.trials.level_studies import BLOCK, HEAD
 
@@ -22,7 +22,10 @@ EDITS = (
     ("standards = [1, 2]", "standards = [1]"),
     ("min_s = 1\nmax_s = 3", "min_s = 0.2\nmax_s = 0.5"),
     ('design = "2ifc"', 'design = "pairs"'),
-    ("[limits]", "[limits]\n" + "\n".join(f"{one} = 1000" for one in ("lateness_ms", "worst_gap_ms", "frame_gap_ms"))),
+    (
+        "[limits]",
+        "[limits]\n" + "\n".join(f"{limit} = 1000" for limit in ("lateness_ms", "worst_gap_ms", "frame_gap_ms")),
+    ),
     (
         "level_error_percent = 100",
         "level_error_percent = 100\ndelay_error_ms = 1000",
@@ -33,7 +36,7 @@ ANSWERS = (Qt.Key.Key_2, Qt.Key.Key_Left)
 
 
 class Attentive(Person):
-    """Answers by keys, and keeps which tanks and signs of feedback were seen."""
+    """A person who answers by keys, and records the shown tanks and feedback signs."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -57,7 +60,7 @@ class Attentive(Person):
             super().look()
 
 
-def edited(folder: Path, text: str, edits: tuple[tuple[str, str], ...]) -> Path:
+def write_edited_study(folder: Path, text: str, edits: tuple[tuple[str, str], ...]) -> Path:
     """Write a study, with such edits of its text."""
     for old, new in edits:
         assert old in text
@@ -66,26 +69,26 @@ def edited(folder: Path, text: str, edits: tuple[tuple[str, str], ...]) -> Path:
     return folder / "levels.toml"
 
 
-def test_a_session_of_pairs_is_attended_by_keys_alone(tmp_path: Path) -> None:
+def test_a_session_of_pairs_is_completed_by_keys_alone(tmp_path: Path) -> None:
     results = tmp_path / "results" / "levels"
     person = Attentive()
-    code, _ = attended(edited(tmp_path, HEAD + BLOCK + PAIRS, EDITS), results, person)
-    tanks = {trial: {id(tank) for one, tank in person.tanks if one == trial} for trial, _ in person.tanks}
+    code, _ = run_attended(write_edited_study(tmp_path, HEAD + BLOCK + PAIRS, EDITS), results, person)
+    tanks = {trial: {id(tank) for of_trial, tank in person.tanks if of_trial == trial} for trial, _ in person.tanks}
     assert code == 0
     assert [row["response"] for row in rows(results, "responses")][-2:] == ["second", "first"]
-    told = events(results)
-    assert told[-1]["status"] == "completed"
+    journal = events(results)
+    assert journal[-1]["status"] == "completed"
     # A computer that is late makes an attempt invalid; its trial comes again.
-    whole = [event for event in told if event["event"] == "trial_ended" and event["outcome"] == "complete"]
+    whole = [event for event in journal if event["event"] == "trial_ended" and event["outcome"] == "complete"]
     last = {(str(event["trial"]), str(event["attempt"])) for event in whole}
     intervals = [row for row in rows(results, "intervals") if (row["trial"], row["attempt"]) in last]
     assert [(row["interval"], row["outcome"]) for row in intervals] == 2 * [("1", "complete"), ("2", "complete")]
     assert all(float(row["gap_s"]) >= 0.6 for row in intervals if row["gap_s"] != "n/a")
-    assert {trial: len(seen) for trial, seen in tanks.items()} == {1: 1, 2: 1}
+    assert {trial: len(tank_ids) for trial, tank_ids in tanks.items()} == {1: 1, 2: 1}
     assert person.signs
     ended = [event["t_s"] for event in whole]
-    shown = [event["t_s"] for event in told if event["event"] == "item_shown"]
-    assert all(item - end < 1.0 for end, item in zip(ended, shown, strict=True))
+    item_times_s = [event["t_s"] for event in journal if event["event"] == "item_shown"]
+    assert all(item - end < 1.0 for end, item in zip(ended, item_times_s, strict=True))
 
 
 SETTING = """
@@ -113,7 +116,7 @@ STEPS = (Qt.Key.Key_Right, Qt.Key.Key_Right, Qt.Key.Key_Left, Qt.Key.Key_Right)
 
 
 class Adjusting(Person):
-    """Steps by keys, then confirms until the next page comes."""
+    """A person who adjusts by keys, then confirms until the next page."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -137,19 +140,19 @@ class Adjusting(Person):
 @pytest.mark.nightly
 def test_levels_are_set_by_keys_alone(tmp_path: Path) -> None:
     results = tmp_path / "results" / "levels"
-    code, _ = attended(edited(tmp_path, HEAD + SETTING, (EDITS[2], *EDITS[4:])), results, Adjusting())
+    code, _ = run_attended(write_edited_study(tmp_path, HEAD + SETTING, (EDITS[2], *EDITS[4:])), results, Adjusting())
     assert code == 0
     journal = events(results)
     assert journal[-1]["status"] == "completed"
     last = {line["trial"]: line["attempt"] for line in journal if line["event"] == "trial_started"}
-    counted = [
+    last_attempts = [
         line for line in journal if line.get("attempt") == last.get(line.get("trial"), 0)
     ]  # a pause may repeat one
-    made = [(line["trial"], line["steps"]) for line in counted if line["event"] == "stepped"]
-    assert made == [(trial, steps) for trial in (1, 2) for steps in (1, 1, -1, 1)]
+    steps_made = [(line["trial"], line["steps"]) for line in last_attempts if line["event"] == "stepped"]
+    assert steps_made == [(trial, steps) for trial in (1, 2) for steps in (1, 1, -1, 1)]
     assert len({line["scene"] for line in journal if line["event"] == "stepped"}) >= 8
     assert [row["response"] for row in rows(results, "responses")] == ["2", "2"]
-    assert [line["interval"] for line in counted if line["event"] == "interval_ended"] == [1, 2, 1, 2]
+    assert [line["interval"] for line in last_attempts if line["event"] == "interval_ended"] == [1, 2, 1, 2]
     session = next((results / "data").glob("sub-*/ses-*"))
     assert reproduce_session(session).differences == []
     assert replay(session).differences == ()

@@ -10,7 +10,7 @@ from study_app.outlets.markers import CODES
 from study_app.store import workstation
 from study_app.store.verification.whole_study import verify_study
 from study_app.store.workstation import MachineSettings
-from tests.app.people import Person, attended, events, receipt_of, window
+from tests.app.people import Person, events, receipt_of, run_attended, window
 from tests.compiled import needs_servo
 
 pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
@@ -40,14 +40,14 @@ def port():
 def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, port):
     ours, name = port
     workstation.save_settings(MachineSettings(lsl_markers=True, lsl_samples="single-blind", triggers=f"serial:{name}"))
-    code, lines = attended(short_demo, results)
+    code, lines = run_attended(short_demo, results)
     assert code == 0
     came = [byte for byte in os.read(ours, 65536) if byte]
     os.close(ours)
     lines_written = events(results)
-    assert came == [CODES[one["event"]] for one in lines_written if one["event"] in CODES]
+    assert came == [CODES[line["event"]] for line in lines_written if line["event"] in CODES]
     assert {CODES[event] for event in ("trial_started", "trial_ended", "responses", "session_ended")} < set(came)
-    assert "outlet_lost" not in {one["event"] for one in lines_written}
+    assert "outlet_lost" not in {line["event"] for line in lines_written}
     assert verify_study(results).is_sound
     outlets = receipt_of(results)["outlets"]
     assert set(outlets) == {"LSL markers", "Serial port"}
@@ -56,32 +56,32 @@ def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, p
     assert "warning  LSL markers     no listener" in said
     assert "ok       LSL samples     off; because the study is double-blind" in said
     assert "ok       Serial port     ready" in said
-    assert not [one for one in threading.enumerate() if one.name.startswith("outlet")]
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("outlet")]
 
 
-def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, results, port):
+def test_an_unplugged_port_is_reported_once_and_does_not_stop_the_session(short_demo, results, port):
     ours, name = port
     workstation.save_settings(MachineSettings(triggers=f"serial:{name}"))
-    shown: list[tuple[str, ...]] = []
+    tally_texts: list[tuple[str, ...]] = []
 
     class Unplugger(Person):
         def look(self):
             operator = window(OperatorWindow)
-            if not shown and self.once is None and self.answered is not None:
+            if not tally_texts and self.once is None and self.answered is not None:
                 os.close(ours)
-                shown.append(())
-            elif shown and operator is not None and operator.rail.tally.beyond.text():
-                shown.append((operator.rail.tally.beyond.text(),))
+                tally_texts.append(())
+            elif tally_texts and operator is not None and operator.rail.tally.beyond.text():
+                tally_texts.append((operator.rail.tally.beyond.text(),))
             super().look()
 
-    code, _ = attended(short_demo, results, Unplugger())
+    code, _ = run_attended(short_demo, results, Unplugger())
     assert code == 0
     lines_written = events(results)
     assert lines_written[-1]["status"] == "completed"
-    lost = [(one["outlet"], one["reason"]) for one in lines_written if one["event"] == "outlet_lost"]
+    lost = [(line["outlet"], line["reason"]) for line in lines_written if line["event"] == "outlet_lost"]
     assert len(lost) == 1
     assert lost[0][0] == "Serial port"
     assert lost[0][1].startswith(f"serial:{name} failed")
-    assert any(text.startswith(f"Serial port: serial:{name} failed") for (text,) in shown[1:])
-    assert sum(one["event"] == "responses" for one in lines_written) == 4
+    assert any(text.startswith(f"Serial port: serial:{name} failed") for (text,) in tally_texts[1:])
+    assert sum(line["event"] == "responses" for line in lines_written) == 4
     assert verify_study(results).is_sound

@@ -12,19 +12,19 @@ from study_app.gui.home.main_window import MainWindow
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.session.pages import PausePage
-from tests.app.people import Leaver, Person, attended, events, looking, place_at_home, receipt_of, rows, window
+from tests.app.people import Leaver, Person, events, place_at_home, poll_windows, receipt_of, rows, run_attended, window
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp", "nobody_stays", "quick_preflight")]
 
 
-def begin(asked):
-    """Start the session and return whether it starts; where the busy computer did not pass, measure again."""
-    starts = asked.start.isEnabled()
+def begin(preflight):
+    """Start the session and return whether it starts; if the pre-flight failed on a busy computer, measure again."""
+    starts = preflight.start.isEnabled()
     if starts:
-        asked.start.click()
-    elif asked.again.isEnabled():
-        asked.again.click()
+        preflight.start.click()
+    elif preflight.again.isEnabled():
+        preflight.again.click()
     return starts
 
 
@@ -58,7 +58,7 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
             steps.append(home.sessions.shown[0].status)
             home.window().close()
 
-    with looking(step):
+    with poll_windows(step):
         assert app.run_home_window(tmp_path / "results") == 0
     assert steps == ["asked", "looked", "ended", "withdrawn"]
     assert events(tmp_path / "results" / "demo")[-1]["status"] == "withdrawn"
@@ -69,24 +69,28 @@ def test_going_back_before_the_session_leaves_nothing(tmp_path, monkeypatch):
     steps = []
 
     def step():
-        home, asked = place_at_home(), window(PreflightWindow)
+        home, preflight = place_at_home(), window(PreflightWindow)
         if not steps and home is not None and home.grid.cards:
             steps.append("asked")
             card = next(card for card in home.grid.cards if card.facts.source == "demo")
             card.new.click()
             home.dialog.begin.click()
-        elif steps == ["asked"] and asked is not None:
+        elif steps == ["asked"] and preflight is not None:
             steps.append("again")
-            asked.again.click()
-            assert not asked.start.isEnabled()
-        elif steps == ["asked", "again"] and asked is not None and (asked.start.isEnabled() or asked.again.isEnabled()):
+            preflight.again.click()
+            assert not preflight.start.isEnabled()
+        elif (
+            steps == ["asked", "again"]
+            and preflight is not None
+            and (preflight.start.isEnabled() or preflight.again.isEnabled())
+        ):
             steps.append("back")
-            asked.cancel.click()
+            preflight.cancel.click()
         elif steps == ["asked", "again", "back"] and home is not None:
             steps.append("home")
             home.window().close()
 
-    with looking(step):
+    with poll_windows(step):
         assert app.run_home_window(tmp_path / "results") == 0
     assert steps == ["asked", "again", "back", "home"]
     assert list(tmp_path.iterdir()) == []
@@ -95,9 +99,9 @@ def test_going_back_before_the_session_leaves_nothing(tmp_path, monkeypatch):
 @pytest.fixture
 def stopped(short_demo, results, monkeypatch):
     """Return a protocol whose session P001 stopped in its second trial."""
-    attended(short_demo, results, Leaver(monkeypatch))
-    told = events(results)
-    assert told[-1]["event"] != "session_ended"
+    run_attended(short_demo, results, Leaver(monkeypatch))
+    journal = events(results)
+    assert journal[-1]["event"] != "session_ended"
     return short_demo
 
 
@@ -113,20 +117,20 @@ def test_a_session_that_stopped_goes_on_where_it_was_to_its_end(stopped, results
     folder = results / "data" / "sub-P001" / "ses-01"
     assert app.resume(folder, protocol=stopped, windowed=True, operator="BB") == 0
     person.deleteLater()
-    told = events(results)
-    assert told[: len(before)] == before
-    (resumed,) = [line for line in told if line["event"] == "session_resumed"]
+    journal = events(results)
+    assert journal[: len(before)] == before
+    (resumed,) = [line for line in journal if line["event"] == "session_resumed"]
     assert resumed["operator"] == "BB"
     assert met == [PausePage(force_off=False)]
     about_recordings = {"recorded", "recording_lost"}  # the first trial's may have been under way
-    after = [line["event"] for line in told[len(before) :] if line["event"] not in about_recordings]
+    after = [line["event"] for line in journal[len(before) :] if line["event"] not in about_recordings]
     assert after[:5] == ["session_resumed", "preflight", "paused", "resumed", "trial_started"]
     assert resumed["gap_s"] >= 0
-    attempts = [(line["trial"], line["attempt"]) for line in told if line["event"] == "trial_started"]
+    attempts = [(line["trial"], line["attempt"]) for line in journal if line["event"] == "trial_started"]
     assert attempts == [(1, 1), (2, 1), (2, 2), (3, 1), (4, 1)]
     assert len(rows(results, "responses")) == 8
     assert [row["outcome"] for row in rows(results, "trials")] == ["complete", "interrupted", *["complete"] * 3]
-    assert told[-1]["status"] == "completed"
+    assert journal[-1]["status"] == "completed"
     assert len(receipt_of(results)["resumed"]) == 1
     with pytest.raises(StoreError, match="finished"):
         app.resume(folder, protocol=stopped, windowed=True)
@@ -135,7 +139,7 @@ def test_a_session_that_stopped_goes_on_where_it_was_to_its_end(stopped, results
 def test_a_changed_protocol_is_refused_with_the_difference_and_nothing_changes(stopped, results, tmp_path):
     changed = tmp_path / "changed.toml"
     changed.write_text(
-        Path(stopped).read_text("utf-8").replace('title = "Now reach"', 'title = "Reach now"'),
+        Path(stopped).read_text("utf-8").replace('title = "Reaching"', 'title = "Reach now"'),
         encoding="utf-8",
         newline="\n",
     )
@@ -165,11 +169,11 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
             operator.close()
         elif len(steps) == 3 and home is not None and not home.is_reading:
             home.sessions.show_kind("every")
-            steps.append([one.status for one in home.sessions.shown])
+            steps.append([session.status for session in home.sessions.shown])
             steps.append(home.banner.isVisible())
             home.window().close()
 
-    with looking(step):
+    with poll_windows(step):
         assert app.run_home_window(results.parent) == 0
     assert steps[0] == "P001, session 1 of demo stopped in part 1, liquid setting 2 of 2"
     assert "Answers on disk: 2 of 8" in steps[1]

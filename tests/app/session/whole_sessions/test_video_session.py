@@ -1,4 +1,4 @@
-"""A session in windows whose conditions show footage: what is kept of it, and what does not tell a condition."""
+"""A session whose conditions show footage: what is recorded, and that it does not reveal a condition."""
 
 import hashlib
 import itertools
@@ -25,7 +25,7 @@ from study_app.store.unblinding import unblind
 from study_app.store.verification.whole_study import verify_study
 from study_app.store.workstation import MachineSettings
 from study_app.video import sources
-from tests.app.people import Person, attended, events, receipt_of, rows, window
+from tests.app.people import Person, events, receipt_of, rows, run_attended, window
 from tests.compiled import needs_servo
 
 pytest.importorskip("av", reason="the optional extra video is not installed")
@@ -52,7 +52,7 @@ def study(short_demo: str) -> Path:
 
 @pytest.fixture
 def run(study: Path, results: Path) -> Callable[[], int]:
-    return lambda: attended(study, results)[0]
+    return lambda: run_attended(study, results)[0]
 
 
 def test_footage_is_shown_recorded_and_sealed(study: Path, run: Any, results: Path) -> None:
@@ -69,9 +69,9 @@ def test_footage_is_shown_recorded_and_sealed(study: Path, run: Any, results: Pa
     key = read_key(results)
     assert not verify_study(results).errors
     unblind(results, by="AK", reason="a test")
-    shown = {row["trial"]: row["video_frames"] for row in rows(results, "trials")}
+    frames_of = {row["trial"]: row["video_frames"] for row in rows(results, "trials")}
     thick = {row["trial"] for row in rows(results, "trials") if key.condition(row["block"], row["code"]) == "thick"}
-    assert {trial for trial, frames in shown.items() if frames != "n/a"} == thick
+    assert {trial for trial, frames in frames_of.items() if frames != "n/a"} == thick
     for row in rows(results, "trials"):
         recorded = read_frames(results / "data" / "sub-P001" / "ses-01" / row["recording_frames"])
         if row["trial"] not in thick:
@@ -104,7 +104,7 @@ def test_a_camera_that_is_not_there_is_refused(study: Path, run: Any, results: P
 
 
 class Operator(Person):
-    """Reconnects what failed as soon as that is offered, and resumes.
+    """An operator who reconnects failed devices as soon as possible, and resumes.
 
     ``forces`` says whether one was on meanwhile, ``troubles`` what was shown to have failed.
     """
@@ -134,7 +134,7 @@ class Operator(Person):
 def test_footage_that_stops_is_opened_again_by_the_operator(
     study: Path, results: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The haptic device is well, and is left as it is; the trial is presented again, with the video."""
+    """The working haptic device is left as it is; the trial is presented again with the video."""
     write_clip(study.parent / NAME, frames=20, size=(320, 180))
     reconnected: list[Rig] = []
     monkeypatch.setattr(Rig, "reconnect", reconnected.append)
@@ -154,7 +154,7 @@ def test_footage_that_stops_is_opened_again_by_the_operator(
         fail(bridge, error)
 
     monkeypatch.setattr(SessionBridge, "fail", failed)
-    assert attended(study, results, operator)[0] == 0
+    assert run_attended(study, results, operator)[0] == 0
     lines = events(results)
     (broke,) = [line for line in lines if line["event"] == "broke"]
     (again,) = [line for line in lines if line["event"] == "device_reconnected"]

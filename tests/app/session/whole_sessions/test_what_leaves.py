@@ -1,4 +1,4 @@
-"""What leaves the room: needles in every setting and every typed text, looked for in every file that is passed on.
+"""Data that leave the computer: markers in every setting and typed text are searched for in every shared file.
 
 A session is attended in its windows; then the study is exported, reported, preregistered, sent to support, and so on.
 """
@@ -26,12 +26,12 @@ from study_app.store import workstation
 from study_app.store.exclusions import exclude, include
 from study_app.store.files.folders import StudyFolder
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.support import write_support
+from study_app.store.support import write_support_archive
 from study_app.store.unblinding import unblind
 from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import Tombstone, add_tombstone
 from study_app.store.workstation import MachineSettings
-from tests.app.people import Person, attended, window
+from tests.app.people import Person, run_attended, window
 from tests.compiled import needs_servo
 from tests.outlets.collector import Collector
 
@@ -76,7 +76,7 @@ LEAVES = {
 
 
 class Talker(Person):
-    """Answers, writes a comment, and the operator a note."""
+    """A person who answers and comments, with an operator who adds a note."""
 
     noted = False
 
@@ -98,7 +98,7 @@ class Talker(Person):
 
 @pytest.fixture
 def camera() -> Iterator[int]:
-    """The port of a camera that answers one program."""
+    """Return the port of a camera that answers one program."""
     words = [sys.executable, str(SENDER), "--size", "64x48", "--seconds", "40"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as sender:
         assert sender.stdout is not None
@@ -122,7 +122,7 @@ def needles_in(path: Path) -> set[str]:
     return {needle for needle in STUDY | SETTINGS | TYPED if any(needle.encode() in content for content in held)}
 
 
-def test_what_was_typed_leaves_only_where_it_must(
+def test_typed_texts_appear_only_in_the_expected_outputs(
     short_demo: str,
     results: Path,
     tmp_path: Path,
@@ -135,7 +135,7 @@ def test_what_was_typed_leaves_only_where_it_must(
         ('title = "A first look"', 'title = "zq_title"'),
         ('description = "', 'credits.authors = ["zq_author"]\ndescription = "zq_description '),
         ('"delays", "thanks"]', '"delays", "last", "thanks"]'),
-        ('title = "That was it"', 'title = "zq_page"'),
+        ('title = "The end"', 'title = "zq_page"'),
         ('[conditions.thick]\nliquid = "thick"\n', '[conditions.thick]\nliquid = "thin"\nview = "camera"\n'),
         ('instruction = "', 'instruction = "zq_instruction '),
     )
@@ -144,7 +144,7 @@ def test_what_was_typed_leaves_only_where_it_must(
         text = text.replace(old, new, 1)
     Path(short_demo).write_text(text + ANSWER, encoding="utf-8", newline="\n")
     place = str(tmp_path / "zq_{}" / "x.toml")
-    told = MachineSettings(
+    settings = MachineSettings(
         camera=f"tcp://zq_user:zq_password@127.0.0.1:{camera}",
         operator="zq_operator",
         screen="zq_screen",
@@ -153,11 +153,11 @@ def test_what_was_typed_leaves_only_where_it_must(
         workspace=place.format("workspace"),
         stamp_root=place.format("stamp_root"),
     )
-    workstation.save_settings(told)
+    workstation.save_settings(settings)
     start_log()
     collected, attach = Collector(), SessionStore.attach
     monkeypatch.setattr(SessionStore, "attach", lambda store, _outlets: attach(store, collected))
-    code, lines = attended(short_demo, results, Talker(), operator="zq_person")
+    code, lines = run_attended(short_demo, results, Talker(), operator="zq_person")
     assert code == 0, lines
     folder = StudyFolder(results)
     exclude(results, "P001", 1, trial=1, by="zq_by", reason="zq_why")
@@ -171,21 +171,21 @@ def test_what_was_typed_leaves_only_where_it_must(
     logging.getLogger("study_app").error("failed: %s", "zq_note")
     caplog.clear()
     later = {"triggers": "serial:/dev/zq_triggers", "device": "falcon:zq_device"}
-    told = told.model_copy(update={**later, "stamps": "https://zq_stamps", "proofs": place.format("proofs")})
-    typed = {name for name, value in told if isinstance(value, str) and name not in ("theme", "lsl_samples")}
-    assert all("zq_" in getattr(told, name) for name in typed), typed
-    workstation.save_settings(told)
+    settings = settings.model_copy(update={**later, "stamps": "https://zq_stamps", "proofs": place.format("proofs")})
+    typed = {name for name, value in settings if isinstance(value, str) and name not in ("theme", "lsl_samples")}
+    assert all("zq_" in getattr(settings, name) for name in typed), typed
+    workstation.save_settings(settings)
     out = tmp_path / "out"
     for name in ("support", "log", "receipt", "list", "markers"):
         (out / name).mkdir(parents=True)
-    write_support(out / "support" / "support.zip")
+    write_support_archive(out / "support" / "support.zip")
     for words in (
         ("export", str(results), "--to", str(out / "export"), "--wide", "--parquet", "--psych-ds"),
         ("report", str(results), "--to", str(out / "report")),
         ("preregister", short_demo, "--to", str(out / "preregistration")),
     ):
-        done = CliRunner().invoke(commands, words)
-        assert done.exit_code in (0, 3), done.output
+        result = CliRunner().invoke(commands, words)
+        assert result.exit_code in (0, 3), result.output
     (out / "export" / "psych-ds").rename(out / "psych-ds")
     for name, path in (("log", log_file()), ("receipt", folder.sessions()[0].receipt), ("list", folder.fingerprints)):
         shutil.copy(path, out / name)

@@ -1,4 +1,4 @@
-"""The command's way into a session, with real windows, servo and store, without a screen."""
+"""Sessions started by command with real windows, servo and store, without a screen."""
 
 import json
 import shutil
@@ -24,7 +24,7 @@ from study_app.store import workstation
 from study_app.store.recordings import read_frames
 from study_app.store.versions.study_versions import kept_content
 from study_app.store.workstation import MachineSettings
-from tests.app.people import Person, attended, can_go_on, events, rows, window
+from tests.app.people import Person, can_go_on, events, rows, run_attended, window
 from tests.compiled import needs_servo
 from tests.store.forging import secret_of
 
@@ -33,19 +33,19 @@ pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp", "no
 
 @pytest.mark.parametrize("device", [pytest.param("scripted", marks=pytest.mark.nightly), "falcon-emulated"])
 def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_demo, results, device):
-    """A machine that starves the emulator's Python code loses the device and ends the session: then again."""
+    """On a busy machine the emulated device may be lost, which ends the session: then it is repeated."""
     folder = results / "data" / "sub-P001" / "ses-01"
     for _ in range(3):
         shutil.rmtree(results, ignore_errors=True)
         traced = []
         person = Person(once=lambda _participant: traced.append((folder / "crash.txt").read_bytes()))  # noqa: B023
         with suppress(StudyError):
-            code, lines = attended(short_demo, results, person, device=device)
+            code, lines = run_attended(short_demo, results, person, device=device)
             break
     assert code == 0
-    told = events(results)
-    assert told[-1]["event"] == "session_ended"
-    assert told[-1]["status"] == "completed"
+    journal = events(results)
+    assert journal[-1]["event"] == "session_ended"
+    assert journal[-1]["status"] == "completed"
     proof, _, place = (results / "fingerprints.txt").read_text("utf-8").rstrip().partition("  ")
     assert place == "data/sub-P001/ses-01"
     assert lines[-2] == f"session fingerprint (also in the study's fingerprints.txt): {proof}"
@@ -96,7 +96,7 @@ def test_a_signal_or_a_log_off_leaves_the_session_unfinished_and_resumable(short
         else:
             signal.raise_signal(number)
 
-    code, lines = attended(short_demo, results, Person(once=suspend_and_end), device="mouse")
+    code, lines = run_attended(short_demo, results, Person(once=suspend_and_end), device="mouse")
     assert code == 128 + (number or 1)
     assert hasattr(manager, "hint") == (number is None)
     assert lines[-1] == f"session not finished: {results / 'data' / 'sub-P001' / 'ses-01'}"
@@ -115,7 +115,7 @@ def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monke
         machines[0].device.unplug()
 
     with pytest.raises(StudyError, match="stopped responding"):
-        attended(short_demo, results, Person(once=unplug), device="mouse")
+        run_attended(short_demo, results, Person(once=unplug), device="mouse")
     assert events(results)[-1]["status"] == "broken"
     assert not machines[0].servo.force_is_on
 
@@ -131,7 +131,7 @@ def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monke
         ({"results": Path("file") / "demo"}, SessionError),
     ],
 )
-def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, monkeypatch, tmp_path, wrong, refused):
+def test_a_refused_session_leaves_nothing_behind(short_demo, results, monkeypatch, tmp_path, wrong, refused):
     monkeypatch.chdir(tmp_path)
     Path("file").write_text("no folder", encoding="utf-8", newline="\n")
     with pytest.raises(refused) as error:
@@ -143,16 +143,16 @@ def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, monkeypatc
 
 
 @pytest.mark.nightly
-def test_the_receipt_says_what_is_set_for_the_machine_and_words_are_as_large_as_it_asks(short_demo, results):
+def test_the_receipt_states_the_settings_of_the_machine_and_texts_have_their_size(short_demo, results):
     workstation.save_settings(MachineSettings(viewing_distance_mm=1200, screen_width_mm=150))
     scales = []
-    code, _ = attended(short_demo, results, Person(once=lambda participant: scales.append(participant.text_scale)))
+    code, _ = run_attended(short_demo, results, Person(once=lambda participant: scales.append(participant.text_scale)))
     assert code == 0
-    told = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text("utf-8"))["screens"]
-    assert (told["participant"]["viewing_distance_mm"], told["participant"]["width_mm"]) == (1200, 150)
-    assert told["participant"]["display_offset"] is None
+    screens = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text("utf-8"))["screens"]
+    assert (screens["participant"]["viewing_distance_mm"], screens["participant"]["width_mm"]) == (1200, 150)
+    assert screens["participant"]["display_offset"] is None
     assert scales[0] > 1
-    assert told["participant"]["text_scale"] == pytest.approx(scales[0], abs=0.001)
+    assert screens["participant"]["text_scale"] == pytest.approx(scales[0], abs=0.001)
 
 
 def test_cancelling_the_opening_creates_nothing(short_demo, results):
@@ -177,28 +177,28 @@ def test_a_mistake_in_the_program_is_an_exit_code_and_a_trace(short_demo, result
 
 def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    seen = []
+    looks = []
 
     def look(participant):
         corner = participant.grab().toImage().pixelColor(2, 2).name()
-        seen.extend((participant.isFullScreen(), participant.frame_px > 0, corner, participant.windowTitle()))
+        looks.extend((participant.isFullScreen(), participant.frame_px > 0, corner, participant.windowTitle()))
         signal.raise_signal(signal.SIGTERM)
 
     person = Person(once=look)
     app.run(short_demo, participant="test", pilot=True)
     person.deleteLater()
-    assert seen[:3] == [False, True, QColor(PARTICIPANT.warn).name()]
-    assert "pilot" in seen[3]
+    assert looks[:3] == [False, True, QColor(PARTICIPANT.warn).name()]
+    assert "pilot" in looks[3]
     folder = tmp_path / "results" / "demo-pilot"
     assert not (tmp_path / "results" / "demo").exists()
     assert json.loads((folder / "data" / "sub-test" / "ses-01" / "receipt.json").read_text("utf-8"))["pilot"] is True
 
 
-def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
-    told = []
+def test_the_preflight_is_reported_before_any_file_is_created(short_demo, results):
+    progress_lines = []
     person = Person(once=lambda _participant: signal.raise_signal(signal.SIGTERM))
-    attended(short_demo, results, person, progress=lambda line: told.append((line, results.exists())))
-    *before, (last, _) = told
+    run_attended(short_demo, results, person, progress=lambda line: progress_lines.append((line, results.exists())))
+    *before, (last, _) = progress_lines
     assert last.startswith("session not finished: ")
     names = [line[9:25].strip() for line, _ in before]
     assert names == [

@@ -14,7 +14,7 @@ PLACES = ((0, 0, 0.127), (0.03, 0.02, 0.11), (-0.03, 0.02, 0.14), (0.02, -0.02, 
 WEIGHTS_N = (0.0, 4.9, 0.0, 4.9, 2.45)
 
 
-def weighed(gain, offset_rad, own_n, *, places=PLACES, weights_n=WEIGHTS_N):
+def weighed_samples(gain, offset_rad, own_n, *, places=PLACES, weights_n=WEIGHTS_N):
     """Return counts, forces and units of a Falcon that holds weights: by virtual work, slopes taken by differences."""
     mechanism = new_mechanism(GEOMETRY, gain, offset_rad)
 
@@ -39,26 +39,26 @@ class TestFit:
     @pytest.mark.parametrize("gain", [6616.0, 10_000.0, 8000.0])
     @pytest.mark.parametrize("offset_deg", [0.0, 5.0, -3.0])
     def test_finds_gain_offset_and_weight_of_the_grip(self, gain, offset_deg):
-        found = fit(GEOMETRY, *weighed(gain, math.radians(offset_deg), 1.2), measured=date(2026, 11, 20))
-        assert found.units_per_nm == pytest.approx(gain, rel=1e-4)
-        assert math.degrees(found.arm_offset_rad) == pytest.approx(offset_deg, abs=0.01)
-        assert found.own_weight_n == pytest.approx(1.2, abs=1e-3)
-        assert found.residual_n < 1e-3
-        assert (found.geometry, found.poses, found.measured) == ("libnifalcon", 5, "2026-11-20")
+        calibration = fit(GEOMETRY, *weighed_samples(gain, math.radians(offset_deg), 1.2), measured=date(2026, 11, 20))
+        assert calibration.units_per_nm == pytest.approx(gain, rel=1e-4)
+        assert math.degrees(calibration.arm_offset_rad) == pytest.approx(offset_deg, abs=0.01)
+        assert calibration.own_weight_n == pytest.approx(1.2, abs=1e-3)
+        assert calibration.residual_n < 1e-3
+        assert (calibration.geometry, calibration.poses, calibration.measured) == ("libnifalcon", 5, "2026-11-20")
 
     def test_measurements_that_cannot_be_are_named(self):
-        counts, forces_n, units = weighed(6616.0, 0.0, 1.0)
+        counts, forces_n, units = weighed_samples(6616.0, 0.0, 1.0)
         no_pose = counts.copy()
         no_pose[2] = 9000
-        for given, words in (
+        for arguments, words in (
             ((counts[:4], forces_n[:4], units[:4]), "at least 5 poses, not 4"),
-            (weighed(6616.0, 0.0, 1.0, weights_n=(4.9,) * 5), "two weights"),
+            (weighed_samples(6616.0, 0.0, 1.0, weights_n=(4.9,) * 5), "two weights"),
             ((counts, forces_n * 10, units), "check the weights"),
             ((no_pose, forces_n, units), "pose 3"),
             ((counts, forces_n[:, :2], units), "three encoder counts, three force components"),
         ):
             with pytest.raises(DeviceError, match=words):
-                fit(GEOMETRY, *given)
+                fit(GEOMETRY, *arguments)
 
 
 class TestKeeping:
@@ -100,18 +100,18 @@ class TestKeeping:
             '{"geometry": "libnifalcon", "units_per_nm": 7000, "arm_offset_rad": 2}',
         ],
     )
-    def test_a_file_that_makes_no_sense_is_told_with_its_place(self, text):
+    def test_an_invalid_file_is_reported_with_its_path(self, text):
         file = save_calibration("A", self.CALIBRATION)
         file.write_text(text, encoding="utf-8", newline="\n")
         with pytest.raises(DeviceError, match=r"falcon-A\.json.*calibrate again"):
             load_calibration("A")
 
-    def test_a_geometry_that_is_not_known_is_told(self):
+    def test_an_unknown_geometry_is_reported(self):
         save_calibration("A", dataclasses.replace(self.CALIBRATION, geometry="other"))
         with pytest.raises(DeviceError, match="'other'"):
             load_calibration("A")
 
-    def test_a_folder_that_is_a_file_is_told(self, folder):
+    def test_a_file_in_place_of_the_folder_is_reported(self, folder):
         folder.write_text("", encoding="utf-8", newline="\n")
         with pytest.raises(DeviceError, match="LIQUID_STUDY_CONFIG"):
             save_calibration("A", self.CALIBRATION)

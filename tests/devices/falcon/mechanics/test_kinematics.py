@@ -68,10 +68,10 @@ class TestPositions:
         angles_at(mechanism, (0, 0, OUT_STROKE_M + 0.005))
 
     @pytest.mark.slow
-    @given(position_m=inside, seen_m=inside)
-    def test_forward_finds_what_inverse_was_asked_for_from_anywhere(self, mechanism, position_m, seen_m):
+    @given(position_m=inside, start_m=inside)
+    def test_forward_kinematics_inverts_inverse_kinematics_from_any_start(self, mechanism, position_m, start_m):
         assume(reachable(mechanism, position_m))
-        found_m = seen_m.copy()
+        found_m = start_m.copy()
         assert forward(mechanism, angles_at(mechanism, position_m), found_m) == REACHED
         assert np.abs(found_m - position_m).max() < 1e-9
 
@@ -98,7 +98,7 @@ class TestPositions:
         assert found_m.tolist() == [0.01, 0.02, 0.12]
 
     @given(counts=st.tuples(*(st.integers(-32768, 32767) for _ in range(3))))
-    def test_any_counts_give_a_pose_of_theirs_or_none(self, mechanism, counts):
+    def test_any_counts_give_their_pose_or_none(self, mechanism, counts):
         theta, found_m, again = np.zeros(3), np.array(START_M), np.zeros(3)
         angles(mechanism, np.array(counts), theta)
         if forward(mechanism, theta, found_m) == REACHED:
@@ -180,7 +180,7 @@ class TestForces:
         assert np.linalg.norm(sent_n) <= np.linalg.norm(force_n) + rounding_at(mechanism, rates) + 1e-9
 
     @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-    def test_a_torque_that_is_no_number_gives_none_at_all(self, mechanism, bad):
+    def test_a_torque_that_is_not_finite_stops_all_motors(self, mechanism, bad):
         units = np.full(3, 7)
         assert motor_units(mechanism, np.array([0.1, bad, 0.1]), units) == 1
         assert units.tolist() == [0, 0, 0]

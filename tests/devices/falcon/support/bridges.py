@@ -25,13 +25,13 @@ class Backend(EmulatedBackend):
         self.incoming = []  # what the next reads give; nothing left: a time-out
         self.most_written = 1 << 20
 
-    def _called(self, name, *arguments, told=True):
-        self.calls += [(name, *arguments)] * told
+    def _called(self, name, *arguments, is_recorded=True):
+        self.calls += [(name, *arguments)] * is_recorded
         if name in self.fails:
             raise self.fails[name]
 
     def enumerate_devices(self):
-        self._called("enumerate_devices", told=False)
+        self._called("enumerate_devices", is_recorded=False)
         return iter(self.emulators)
 
     def get_device_descriptor(self, dev):
@@ -47,7 +47,7 @@ class Backend(EmulatedBackend):
         self._called("close_device", dev_handle.number)
 
     def get_configuration(self, dev_handle):
-        self._called("get_configuration", told=False)
+        self._called("get_configuration", is_recorded=False)
         return int(self.configured)
 
     def set_configuration(self, dev_handle, config_value):
@@ -139,10 +139,10 @@ class D2xx:
         assert handle == 0x1234
         if not self.waiting:
             self.waiting, self.coming = self.coming, bytearray()
-        given = bytes(self.waiting[:length])
+        chunk = bytes(self.waiting[:length])
         del self.waiting[:length]
-        ctypes.memmove(data, given, len(given))
-        count[0] = len(given)
+        ctypes.memmove(data, chunk, len(chunk))
+        count[0] = len(chunk)
         return self.status
 
     def _write(self, handle, data, length, count):

@@ -1,4 +1,4 @@
-"""A bridge that answers as a test tells it to, called by the compiled exchange through a C function of Python's."""
+"""A scripted bridge, called by the compiled exchange through a C function of Python."""
 
 import ctypes
 import math
@@ -59,7 +59,7 @@ def torques_in(packet):
 
 
 class FakeBridge:
-    """Takes packets into ``sent``, gives what is in ``queue``: one entry a read, bytes or an error."""
+    """A bridge that records packets in ``sent``, and returns one entry of ``queue`` per read: bytes or an error."""
 
     def __init__(self):
         self.queue = deque()
@@ -102,7 +102,7 @@ class Ticks:
         self.now_ns = 1000 * MS
 
     def tick(self, *replies, force_n=(0.0, 0.0, 0.0), after_ns=MS):
-        """Take a tick in which ``replies`` come, glued together; return what read and write answered."""
+        """Take a tick in which the joined ``replies`` arrive; return the answers of read and write."""
         self.now_ns += after_ns
         if replies:
             self.bridge.queue.append(MODEM_STATUS + b"".join(replies))
@@ -111,7 +111,7 @@ class Ticks:
         return answer, self.write.ctypes(self.memory.ctypes.data, self.command.ctypes.data)
 
     def open_gate(self):
-        """Home it, pull the grip out and wait until all force passes."""
+        """Home the device, pull the grip out and wait until the full force passes."""
         self.tick()
         self.pull_out()
         while self.falcon.share < 1.0:

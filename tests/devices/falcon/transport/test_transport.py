@@ -1,4 +1,4 @@
-"""The ways to the Falcon's bridge: what each calls, call by call and byte by byte, and what it says of failures."""
+"""The transports to the Falcon's bridge: their calls and bytes, and their failure messages."""
 
 import ctypes
 import os
@@ -36,16 +36,16 @@ def usb_error(code: int | None, number: int | None = None) -> usb.core.USBError:
 
 
 class Recorded:
-    """What was done with a bridge, as lines: each call of its library, what came back, and what failed."""
+    """A record of a bridge as lines: each call of its library, its result or its failure."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
 
-    def __call__(self, what: str, bridge: Any, do: Callable[..., Any], *given: Any, **named: Any) -> Any:
+    def __call__(self, what: str, bridge: Any, do: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
         bridge.calls.clear()
         result = None
         try:
-            result = do(*given, **named)
+            result = do(*arguments, **named)
             said = repr(result) if isinstance(result, bytes) else f"{getattr(result, 'name', '')}"
         except UsbFailure as failure:
             said = f"{type(failure).__name__}, {failure.kind}"
@@ -119,8 +119,8 @@ def transfers(recorded: Recorded) -> None:
     backend.incoming = [b"\x01\x60abc", b"\x01\x60"]
     for error in (None, usb_error(constants.ERROR_NO_DEVICE, 19), usb_error(None, 75)):
         backend.fails = dict.fromkeys(("ctrl_transfer", "bulk_write", "bulk_read"), error) if error else {}
-        for name, use, given in ways:
-            recorded(f"{name}, {error}", backend, use, *given)
+        for name, use, arguments in ways:
+            recorded(f"{name}, {error}", backend, use, *arguments)
     backend.fails.clear()
     backend.most_written = 15
     recorded("write in part", backend, transport.write, b"hello, a Falcon!", 0.25)
@@ -182,7 +182,7 @@ def test_ftdis_library_moves_bytes_as_a_bridge_would(kind: Any, pytestconfig: py
     compare(GOLDEN / "transport_ftdi_bytes.txt", recorded.lines, pytestconfig)
 
 
-def test_libraries_that_are_missing_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_libraries_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(libusb_package, "get_libusb1_backend", lambda: None)
     with pytest.raises(UsbFailure, match="libusb-package") as caught:
         PyUsbTransport()
@@ -193,7 +193,7 @@ def test_libraries_that_are_missing_are_told(monkeypatch: pytest.MonkeyPatch) ->
         assert caught.value.kind == "no-ftd2xx"
 
 
-def test_libusb_finds_none_and_its_function_is_the_one_that_compiled_code_calls() -> None:
+def test_libusb_finds_no_device_and_compiled_code_calls_its_function() -> None:
     backend = libusb_package.get_libusb1_backend()
     if backend is None:
         pytest.skip("libusb cannot be loaded here")
@@ -232,7 +232,7 @@ def test_the_name_of_a_bridge_opens_it_again(serials: tuple[str | None, ...], na
     assert PyUsbTransport(Backend(*serials), serial=name or None).name == name
 
 
-def test_every_failure_is_one_line_that_says_what_to_do() -> None:
+def test_every_failure_is_one_line_with_its_action() -> None:
     for kind in (*KINDS.values(), *FURTHER_KINDS):
         said = str(UsbFailure(kind, "trying"))
         assert said.startswith("the Falcon cannot be used: ")

@@ -13,20 +13,20 @@ from study_app.haptics.model.layout import records
 VALID = re.compile(rb"<[\x41-\x50]{12}[\x41-\xc0][\x00-\xff]>", re.DOTALL)
 
 
-def packed(*torques, flags=0):
+def packed_samples(*torques, flags=0):
     out = np.zeros(PACKET, np.uint8)
     pack(np.array(torques, np.int64), flags, out)
     return bytes(out)
 
 
 def reply(encoders=(0, 0, 0), buttons=0, homed=0, unknown=0x41):
-    """Return what a Falcon answers, spelt out."""
+    """Return the reply of a Falcon, built byte by byte."""
     numbers = b"".join(bytes(0x41 + int(digit, 16) for digit in f"{n & 0xFFFF:04x}"[::-1]) for n in encoders)
     return b"<" + numbers + bytes([0x41 + buttons + (homed << 4), unknown]) + b">"
 
 
 class Stream:
-    """A parser and what it said last."""
+    """A parser and its last result."""
 
     def __init__(self):
         self._parser, self._status = records(PARSER, 1), records(STATUS, 1)
@@ -49,15 +49,15 @@ def test_every_number_of_16_bits_comes_back():
 
 
 def test_packets_hold_nibbles_from_a_on_the_least_significant_first_in_the_order_of_the_arms():
-    assert packed(1, -1, 0x321) == b"<BAAAPPPPBCDAAA>"
+    assert packed_samples(1, -1, 0x321) == b"<BAAAPPPPBCDAAA>"
     for flags in (0, FLAG_HOMING | FLAG_BLUE):
-        assert packed(0, 0, 0, flags=flags) == quiet_packet(flags)
+        assert packed_samples(0, 0, 0, flags=flags) == quiet_packet(flags)
     assert quiet_packet(FLAG_HOMING | FLAG_BLUE) == b"<AAAAAAAAAAAAFA>"
 
 
 @given(st.lists(st.integers(-(10**12), 10**12), min_size=3, max_size=3))
 def test_no_torque_beyond_the_most_is_ever_packed_nor_one_of_the_other_sign(torques):
-    packet = np.frombuffer(packed(*torques), np.uint8)
+    packet = np.frombuffer(packed_samples(*torques), np.uint8)
     for arm, torque in enumerate(torques):
         assert number(packet, 1 + 4 * arm) == max(-MOST_TORQUE, min(MOST_TORQUE, torque))
 
@@ -86,12 +86,12 @@ def test_two_status_bytes_go_at_the_begin_of_every_64(length):
 def test_packets_are_those_that_a_search_from_left_to_right_finds_however_the_stream_is_cut(parts, cuts):
     data = b"".join(parts)
     stream = Stream()
-    found, at = 0, 0
+    packet_count, at = 0, 0
     for cut in [*cuts, len(data)]:
-        found += stream.feed(data[at : at + cut])
+        packet_count += stream.feed(data[at : at + cut])
         at = min(at + cut, len(data))
     matches = VALID.findall(data)
-    assert found == stream.parser.packets == stream.status.count == len(matches)
+    assert packet_count == stream.parser.packets == stream.status.count == len(matches)
     if matches:
         assert stream.encoders == [number(np.frombuffer(matches[-1], np.uint8), at) for at in (1, 5, 9)]
-    assert stream.parser.skipped + stream.parser.held + PACKET * found == len(data)
+    assert stream.parser.skipped + stream.parser.held + PACKET * packet_count == len(data)

@@ -17,21 +17,23 @@ def volume_m3(diameter_m=0.068):
     return math.pi / 6 * diameter_m**3
 
 
-def floating(density=1000.0, **fields):
+def floating_liquid(density=1000.0, **fields):
     return liquid(density, effects=("buoyancy",), **fields)
 
 
 @settings(max_examples=examples(60), deadline=None)
 @given(density=st.floats(1, 20_000), own=st.floats(1, 20_000), diameter=st.floats(0.001, 1))
 def test_the_displaced_weight_less_the_own(density, own, diameter):
-    felt = simulate(scene(floating(density), body=Body(diameter_m=diameter, density_kg_m3=own)), moving([(1, -2, 3)]))
+    table = simulate(
+        scene(floating_liquid(density), body=Body(diameter_m=diameter, density_kg_m3=own)), moving([(1, -2, 3)])
+    )
     expected = [0, (density - own) * volume_m3(diameter) * G, 0]
-    assert vectors(felt, "force")[0] == pytest.approx(expected, rel=1e-12, abs=1e-12 * (density + own))
+    assert vectors(table, "force")[0] == pytest.approx(expected, rel=1e-12, abs=1e-12 * (density + own))
 
 
 def test_where_two_liquids_meet_the_weight_counts_once():
-    left = floating(800, id="left", region=Box(centre_m=(-1, 0, 0), size_m=(2, 2, 2)))
-    right = floating(1200, id="right", region=Box(centre_m=(1, 0, 0), size_m=(2, 2, 2)))
+    left = floating_liquid(800, id="left", region=Box(centre_m=(-1, 0, 0), size_m=(2, 2, 2)))
+    right = floating_liquid(1200, id="right", region=Box(centre_m=(1, 0, 0), size_m=(2, 2, 2)))
     x_m = np.linspace(-0.05, 0.05, 201)
     motion = Motion(np.arange(201) / 1000, np.column_stack([x_m, 0 * x_m, 0 * x_m]))
     force = simulate(scene(left, right), motion).fy_n / (volume_m3() * G)
@@ -41,7 +43,7 @@ def test_where_two_liquids_meet_the_weight_counts_once():
 
 
 def test_a_liquid_that_does_not_ask_for_it_takes_the_weight_off():
-    sea = floating(1500, id="sea", region=Box(size_m=(4, 4, 4)))
+    sea = floating_liquid(1500, id="sea", region=Box(size_m=(4, 4, 4)))
     weightless = liquid(id="bubble", region=Box(size_m=(1, 1, 1)), effects=("drag",))
     x_m = np.full(50, 1.5)
     x_m[10:] = 0.0

@@ -25,9 +25,9 @@ def resting_at(places_m):
     return Motion(np.arange(len(places_m)) / 1000, places_m, velocity_mps=np.zeros_like(places_m))
 
 
-def flow(felt, places_m):
+def flow(scene, places_m):
     """Return the velocity of the liquid (n, 3), from the drag on a body that is held there."""
-    force = vectors(simulate(felt, resting_at(places_m)), "force")
+    force = vectors(simulate(scene, resting_at(places_m)), "force")
     size = np.linalg.norm(force, axis=1, keepdims=True)
     return np.divide(force, np.sqrt(size * WATER_FACTOR), out=np.zeros_like(force), where=size > 0)
 
@@ -39,9 +39,9 @@ def test_in_its_own_frame_a_river_is_a_pond(through, current):
     wake = {"length": 30, "scaling": 40, "axes": "xyz"}
     path = np.tile(through, (60, 1)) * np.repeat([1.0, 0.3], 30)[:, None]
     pond = simulate(scene(liquid(wake=wake), knee=UNBENT), moving(path))
-    felt = simulate(river(Uniform(velocity_mps=current), wake=wake), moving(path + np.array(current)))
-    assert vectors(felt, "wake") == pytest.approx(vectors(pond, "wake"), abs=1e-12)
-    assert vectors(felt, "force") == pytest.approx(vectors(pond, "force"), abs=1e-11)
+    river_table = simulate(river(Uniform(velocity_mps=current), wake=wake), moving(path + np.array(current)))
+    assert vectors(river_table, "wake") == pytest.approx(vectors(pond, "wake"), abs=1e-12)
+    assert vectors(river_table, "force") == pytest.approx(vectors(pond, "force"), abs=1e-11)
 
 
 @pytest.mark.parametrize(("heading_deg", "along", "across"), [(0, (1, 0, 0), (0, 0, 1)), (90, (0, 0, -1), (1, 0, 0))])
@@ -57,11 +57,11 @@ def test_a_channel_is_fastest_midway_and_still_at_its_walls(heading_deg, along, 
 def test_a_vortex_turns_counter_clockwise_seen_from_above_fastest_at_its_core():
     vortex = Vortex(centre_m=(0.1, 0.0, -0.1), core_m=0.2, peak_mps=0.8)
     right, far, behind = (0.3, 5.0, -0.1), (0.1 + 20, 0.0, -0.1), (0.1, 0.0, -0.3)
-    found = flow(river(vortex), [right, behind, far, (0.1, 1.0, -0.1)])
-    assert found[0] == pytest.approx([0, 0, -0.8])
-    assert found[1] == pytest.approx([-0.8, 0, 0])
-    assert found[2] == pytest.approx([0, 0, -0.8 * 2 * 0.2 / 20], rel=1e-3)
-    assert found[3] == pytest.approx([0, 0, 0], abs=1e-12)
+    flow_mps = flow(river(vortex), [right, behind, far, (0.1, 1.0, -0.1)])
+    assert flow_mps[0] == pytest.approx([0, 0, -0.8])
+    assert flow_mps[1] == pytest.approx([-0.8, 0, 0])
+    assert flow_mps[2] == pytest.approx([0, 0, -0.8 * 2 * 0.2 / 20], rel=1e-3)
+    assert flow_mps[3] == pytest.approx([0, 0, 0], abs=1e-12)
     radii = np.linspace(0.01, 1, 100)
     around = flow(river(vortex), [(0.1 + r, 0.0, -0.1) for r in radii])
     assert radii[np.linalg.norm(around, axis=1).argmax()] == pytest.approx(0.2)

@@ -55,10 +55,10 @@ def test_drag_follows_its_law_against_the_motion(law, velocity, scale, density, 
     [(998.2, 1.0016e-3, 0.2166, 3.01), (913, 0.084, 0.2652, 3.51), (1420, 10, 4.622, 0.780), (1150, 100, None, 0.121)],
 )
 def test_real_liquids_are_as_strong_as_published(law, density, viscosity, at_half_mps_n, mps_at_8_n):
-    felt = simulate(viscous(law, density, viscosity), moving([(0.5, 0, 0), (mps_at_8_n, 0, 0)])).fx_n
+    force_n = simulate(viscous(law, density, viscosity), moving([(0.5, 0, 0), (mps_at_8_n, 0, 0)])).fx_n
     if at_half_mps_n is not None:
-        assert felt[0] == pytest.approx(-at_half_mps_n, rel=0.07)
-    assert felt[1] == pytest.approx(-8, rel=0.07)
+        assert force_n[0] == pytest.approx(-at_half_mps_n, rel=0.07)
+    assert force_n[1] == pytest.approx(-8, rel=0.07)
 
 
 @pytest.mark.slow

@@ -17,12 +17,12 @@ CREEPING_MPS = 1e-10
 
 def tank(effects=("history",), *, rate_hz=1000.0, history=None, **fluid):
     """Return a scene of one viscous liquid, laws of creeping flow, velocities as given."""
-    one = liquid(**fluid, effects=effects, drag=Drag(law="haider-levenspiel"), history=history or {})
-    return scene(one, knee=UNBENT, rate_hz=rate_hz)
+    medium = liquid(**fluid, effects=effects, drag=Drag(law="haider-levenspiel"), history=history or {})
+    return scene(medium, knee=UNBENT, rate_hz=rate_hz)
 
 
-def basset(fluid, t_s, speed_mps, ages_s):
-    """Return −6 R² √(πρµ) ∫ dw/dτ (t − τ)^(−½) dτ for speeds (n,) that are straight lines between their times."""
+def basset_force(fluid, t_s, speed_mps, ages_s):
+    """Return −6 R² √(πρµ) ∫ dw/dτ (t − τ)^(−½) dτ for speeds (n,) interpolated linearly in time."""
     factor = 6 * RADIUS_M**2 * np.sqrt(np.pi * fluid["density_kg_m3"] * fluid["viscosity_pa_s"])
     slope = np.diff(speed_mps) / np.diff(t_s)
     since = np.sqrt(np.maximum(ages_s - t_s[:-1], 0)) - np.sqrt(np.maximum(ages_s - t_s[1:], 0))
@@ -41,14 +41,14 @@ def basset(fluid, t_s, speed_mps, ages_s):
         (WATER, 1, 0.0393, 0.0883),
     ],
 )
-def test_creeping_oscillation_is_that_of_landau_and_lifshitz(fluid, hertz, damping_nspm, inertia_kg):
+def test_creeping_oscillation_equals_landau_and_lifshitz(fluid, hertz, damping_nspm, inertia_kg):
     rate_hz = 5000.0  # a difference lags by half a tick: at 1 kHz that adds 4 % to what little damping water has
     omega, t_s = 2 * np.pi * hertz, np.arange(100_000) / rate_hz
     speed, acceleration = CREEPING_MPS * np.sin(omega * t_s), CREEPING_MPS * omega * np.cos(omega * t_s)
     motion = moving(np.outer(speed, [0.6, 0.0, 0.8]), 1 / rate_hz)
-    felt = simulate(tank(("drag", "added_mass", "history"), rate_hz=rate_hz, **fluid), motion)
+    table = simulate(tank(("drag", "added_mass", "history"), rate_hz=rate_hz, **fluid), motion)
     late = t_s >= 15
-    along = (vectors(felt, "force") @ [0.6, 0.0, 0.8])[late]
+    along = (vectors(table, "force") @ [0.6, 0.0, 0.8])[late]
     (damping, inertia), *_ = np.linalg.lstsq(-np.column_stack([speed, acceleration])[late], along, rcond=None)
     assert damping == pytest.approx(damping_nspm, rel=0.01)
     assert inertia == pytest.approx(inertia_kg, rel=0.01)
@@ -65,9 +65,9 @@ def test_within_the_window_and_far_beyond_it_is_the_integral(legs, pace):
     interval_s = 1e-3 * np.resize(pace, ticks)
     speed = np.repeat(np.cumsum(legs), ticks // len(legs))
     motion = moving(np.outer(speed, [0.0, 1.0, 0.0]), interval_s)
-    felt = simulate(tank(**HONEY, history={"window_s": 0.02}), motion).fy_n
-    exact = [basset(HONEY, motion.t_s[: k + 1], speed[: k + 1], motion.t_s[k]) for k in range(1, ticks)]
-    assert felt[0] == 0.0
+    force_n = simulate(tank(**HONEY, history={"window_s": 0.02}), motion).fy_n
+    exact = [basset_force(HONEY, motion.t_s[: k + 1], speed[: k + 1], motion.t_s[k]) for k in range(1, ticks)]
+    assert force_n[0] == 0.0
     # Ticks that come five times too fast outgrow the rows of the window: the exponentials count from a fifth of it.
     worst = 0.02 if pace == [0.21] else 0.002
-    assert abs(felt[1:] - exact).max() <= worst * max(abs(np.array(exact)).max(), 1e-12)
+    assert abs(force_n[1:] - exact).max() <= worst * max(abs(np.array(exact)).max(), 1e-12)

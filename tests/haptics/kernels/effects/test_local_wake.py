@@ -27,10 +27,10 @@ def legs(*pieces):
     return moving(np.concatenate(velocities)), np.cumsum([len(piece) for piece in velocities])
 
 
-def literal(felt, motion):
-    """Return what the definition says, element by element."""
-    wake = felt.liquids[0].local_wake
-    interval_s = np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / felt.rate_hz)
+def literal(scene, motion):
+    """Return the wake by its definition, element by element."""
+    wake = scene.liquids[0].local_wake
+    interval_s = np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / scene.rate_hz)
     h_mps = motion.velocity_mps * np.array([1.0, 1.0 if wake.axes == "xyz" else 0.0, 1.0])
     numbers = (wake.length, wake.scaling, wake.exponent, wake.decay, wake.reach_m or 0.068, wake.spreading_m2ps)
     return local_wakes(h_mps, motion.position_m, interval_s, *numbers)
@@ -44,38 +44,38 @@ PATHS = {"circle": {}, "stop": {}, "zigzag": {}, "reach": {"distance_m": 0.2}, "
 @pytest.mark.parametrize("name", PATHS)
 @pytest.mark.parametrize(("length", "worst"), [(300, 0.01), pytest.param(1700, 0.06, marks=pytest.mark.nightly)])
 def test_cells_stand_for_their_elements(name, length, worst):
-    felt = tank(length=length, scaling=length, decay=0.999975, spreading_m2ps=1e-3)
+    scene = tank(length=length, scaling=length, decay=0.999975, spreading_m2ps=1e-3)
     motion = programmed_motion(name, **PATHS[name])
-    exact = literal(felt, motion)
-    error = np.linalg.norm(vectors(simulate(felt, motion), "wake") - exact, axis=1)
+    exact = literal(scene, motion)
+    error = np.linalg.norm(vectors(simulate(scene, motion), "wake") - exact, axis=1)
     assert error.max() <= worst * np.linalg.norm(exact, axis=1).max()
 
 
 def test_within_one_cell_the_first_ticks_are_the_definition():
-    felt = tank(decay=0.99, exponent=0.5)
+    scene = tank(decay=0.99, exponent=0.5)
     motion = moving(np.tile([0.5, 0.0, 0.1], (6, 1)))
-    assert vectors(simulate(felt, motion), "wake") == pytest.approx(literal(felt, motion), rel=1e-3)
+    assert vectors(simulate(scene, motion), "wake") == pytest.approx(literal(scene, motion), rel=1e-3)
 
 
-def test_cells_that_are_merged_stand_for_their_elements():
-    """Each tick that moves follows one at rest, so that each has a cell of its own, and the first 36 are merged."""
-    felt = tank(length=100, scaling=100, decay=0.995, exponent=0.5, spreading_m2ps=0.02, reach_m=0.02, axes="xyz")
+def test_merged_cells_approximate_their_elements():
+    """Every moving tick follows a tick at rest, so each has its own cell; the first 36 cells are merged."""
+    scene = tank(length=100, scaling=100, decay=0.995, exponent=0.5, spreading_m2ps=0.02, reach_m=0.02, axes="xyz")
     ticks = np.arange(CELLS + 36)
     speeds = np.stack([0.5 + 0.3 * np.cos(ticks), 0.4 * np.cos(ticks / 9), 0.5 * np.sin(ticks / 9)], axis=1)
     motion = moving(speeds * (ticks % 2 == 0)[:, None])
-    exact = literal(felt, motion)
-    found = vectors(simulate(felt, motion), "wake")
-    assert found[:CELLS] == pytest.approx(exact[:CELLS], rel=1e-12)
-    assert found[CELLS:] == pytest.approx(exact[CELLS:], rel=0.02, abs=1e-3)
-    assert found[-1] == pytest.approx([0.116540706, -0.034358285, -0.036422561], rel=1e-6)  # as recorded
+    exact = literal(scene, motion)
+    wake = vectors(simulate(scene, motion), "wake")
+    assert wake[:CELLS] == pytest.approx(exact[:CELLS], rel=1e-12)
+    assert wake[CELLS:] == pytest.approx(exact[CELLS:], rel=0.02, abs=1e-3)
+    assert wake[-1] == pytest.approx([0.116540706, -0.034358285, -0.036422561], rel=1e-6)  # as recorded
 
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0])
-def test_what_fades_counts_less_in_the_response_too(exponent):
-    felt = tank(decay=0.95, exponent=exponent)
+def test_faded_elements_count_less_in_the_response_too(exponent):
+    scene = tank(decay=0.95, exponent=exponent)
     motion, (moved, _, again) = legs(((1.0, 0, 0), 0.02), ((0.0, 0, 0), 0.03), ((0.2, 0, 0), 0.02))
-    exact = literal(felt, motion)
-    assert vectors(simulate(felt, motion), "wake")[moved:again] == pytest.approx(
+    exact = literal(scene, motion)
+    assert vectors(simulate(scene, motion), "wake")[moved:again] == pytest.approx(
         exact[moved:again], rel=0.01, abs=1e-12
     )
 
@@ -107,8 +107,8 @@ def test_a_current_carries_it_along(seed, current, exponent):
 )
 def test_whatever_the_motion_it_never_outruns_the_body_and_loses_no_element(seed, length, exponent, decay, reach):
     random = np.random.default_rng(seed)
-    felt = tank(length=length, scaling=length, exponent=exponent, decay=decay, reach_m=reach, axes="xyz")
-    hand = Hand(felt, rules=VERSIONS[2])  # no hand turns so suddenly
+    scene = tank(length=length, scaling=length, exponent=exponent, decay=decay, reach_m=reach, axes="xyz")
+    hand = Hand(scene, rules=VERSIONS[2])  # no hand turns so suddenly
     place, fastest = np.zeros(3), 0.0
     for turn in range(1, 600 if COMPILED else 60):
         if turn % 40 == 0:

@@ -63,15 +63,15 @@ def test_under_half_of_the_yield_force_the_hand_creeps_below_1_mm_per_s(name):
 @compiled
 def test_the_force_of_thickening_grows_no_steeper_than_the_slope_limit():
     tank_scene = tank("cornstarch", scale=3.0, velocity=scene().velocity).model_copy(update={"force_limit_n": 20.0})
-    sent, asked = [], []
+    sent_n, requested_n = [], []
     for hand_mps in (0.07, 0.08, 0.09):
         last = Hand(tank_scene).sweep(hand_mps, 300)[-1]
-        sent.append(-last.device_force_n[0])
-        asked.append(-last.force_n[0])
+        sent_n.append(-last.device_force_n[0])
+        requested_n.append(-last.force_n[0])
         assert last.limiters & LIMITER_SLOPE
-    assert np.diff(asked).min() / 0.01 > 60
-    assert np.diff(sent).max() / 0.01 <= 53 * 1.3  # the inertial factor grows with the speed, too
-    assert sent[1] == pytest.approx(steady_sent(tank_scene, 0.08), rel=1e-3)
+    assert np.diff(requested_n).min() / 0.01 > 60
+    assert np.diff(sent_n).max() / 0.01 <= 53 * 1.3  # the inertial factor grows with the speed, too
+    assert sent_n[1] == pytest.approx(steady_sent(tank_scene, 0.08), rel=1e-3)
 
 
 def steady_sent(tank_scene, hand_mps):

@@ -22,15 +22,17 @@ def pool(*effects, region=POOL, **fields):
 def shares(depth, region=POOL):
     """Return the shares of volume, of the frontal areas upright and level, at h/D = ``depth``."""
     heights_m = TOP_M + RADIUS_M - np.array([depth, 3.0, -1.0]) * 2 * RADIUS_M
-    found = []
+    shares_found = []
     for effect, velocity_mps in (("buoyancy", (0, 0, 0)), ("drag", (0, 1.0, 0)), ("drag", (1.0, 0, 0))):
-        felt = pool(effect, region=region, density_kg_m3=500)
-        at, below, above = vectors(simulate(felt, through(heights_m, velocity_mps)), "force").sum(axis=1)
-        found.append((at - above) / (below - above))
-    return found
+        pool_scene = pool(effect, region=region, density_kg_m3=500)
+        at, below, above = vectors(simulate(pool_scene, motion_at_heights(heights_m, velocity_mps)), "force").sum(
+            axis=1
+        )
+        shares_found.append((at - above) / (below - above))
+    return shares_found
 
 
-def through(y_m, velocity_mps, interval_s=1e-3):
+def motion_at_heights(y_m, velocity_mps, interval_s=1e-3):
     """Return a motion at these heights (n,) with one velocity (3,)."""
     y_m = np.asarray(y_m, float)
     places = np.column_stack([0 * y_m, y_m, 0 * y_m])
@@ -64,12 +66,12 @@ def test_the_cap_of_a_ball(depth, volume, upright, level, region):
 )
 def test_nothing_steps_at_the_surface(effects, velocity):
     y_m = np.linspace(TOP_M + 0.05, TOP_M - 0.05, 2001)
-    force = vectors(simulate(pool(*effects), through(y_m, velocity)), "force")
+    force = vectors(simulate(pool(*effects), motion_at_heights(y_m, velocity)), "force")
     assert abs(np.diff(force, axis=0)).max() < 0.01 * abs(force).max()
 
 
 def test_entering_through_the_surface_takes_no_time_and_through_a_wall_20_ms():
-    falling = simulate(pool("drag"), through([TOP_M + 0.05, TOP_M - 0.05], (0, -1.0, 0))).fy_n
+    falling = simulate(pool("drag"), motion_at_heights([TOP_M + 0.05, TOP_M - 0.05], (0, -1.0, 0))).fy_n
     assert falling == pytest.approx([0.0, WATER_FACTOR])
     x_m = np.where(np.arange(40) < 10, 1.5, 0.9)
     places = np.column_stack([x_m, np.zeros(40), np.zeros(40)])
@@ -83,10 +85,11 @@ def test_entering_through_the_surface_takes_no_time_and_through_a_wall_20_ms():
 def test_of_two_liquids_on_top_of_each_other_the_ball_is_shared_at_their_surface():
     oil = liquid(500, id="oil", region=Box(size_m=(2, 4, 2)), effects=("drag", "buoyancy"))
     water = liquid(1000, id="water", region=POOL, effects=("drag", "buoyancy", "surface"))
-    felt = scene(oil, water, knee=UNBENT, velocity=Given())
+    layered_scene = scene(oil, water, knee=UNBENT, velocity=Given())
     volume = 4 / 3 * math.pi * RADIUS_M**3
     half, above, below = (
-        simulate(felt, through(np.full(30, y), (0, 0, 0))).fy_n[-1] for y in (TOP_M, TOP_M + 0.1, TOP_M - 0.1)
+        simulate(layered_scene, motion_at_heights(np.full(30, y), (0, 0, 0))).fy_n[-1]
+        for y in (TOP_M, TOP_M + 0.1, TOP_M - 0.1)
     )
     assert above == pytest.approx((500 - 1000) * volume * 9.80665)
     assert half == pytest.approx((750 - 1000) * volume * 9.80665)

@@ -42,10 +42,10 @@ def test_steady_drag_is_stokes_at_rest_and_that_of_the_solver_to_re_200():
 def test_as_re_vanishes_it_is_stokes_added_mass_and_basset_within_a_percent(name, truth):
     """Landau & Lifshitz §24 and Basset 1888, at Re 1e-5."""
     box = MotionBox(speed_mps=0.6, acceleration_mps2=6)
-    felt = tank(name).model_copy(update={"motion": box, "rate_hz": 4000.0})
-    (case,) = truth(felt).cases
+    scene = tank(name).model_copy(update={"motion": box, "rate_hz": 4000.0})
+    (case,) = truth(scene).cases
     slow = Motion(case.motion.t_s, case.motion.position_m / 1e3, velocity_mps=case.motion.velocity_mps / 1e3)
-    error_n = 1e3 * vectors(simulate(felt, slow), "force") - case.force_n
+    error_n = 1e3 * vectors(simulate(scene, slow), "force") - case.force_n
     rms = np.sqrt(np.mean(error_n[case.counted] ** 2) / np.mean(case.force_n[case.counted] ** 2))
     assert rms <= 0.01
 
@@ -64,12 +64,12 @@ def test_it_is_the_fluid_solver_within_4_percent_and_6_of_the_peak(table):
 @pytest.mark.parametrize(("interval_s", "within"), [(1e-3, 0.002), (4e-3, 0.01), (2e-2, 0.02)])
 @pytest.mark.parametrize("name", FLUIDS)
 def test_it_equals_its_law_by_the_letter(name, interval_s, within):
-    """The letter has exact exponentials; the steps of the kernel approximate them, and late ticks need them."""
+    """The reference uses exact exponentials, which the kernel approximates; late ticks need them."""
     velocity = random_motion(3, ticks=1500) + np.array([0.1, 0.0, -0.05])
     velocity = velocity[:: round(interval_s / 1e-3)]
-    felt, even_s = tank(name), np.full(len(velocity), interval_s)
-    by_letter = unsteady_n(felt, velocity, np.diff(velocity, axis=0, prepend=velocity[:1]) / interval_s, even_s)
-    assert abs(force(felt, velocity, even_s) - by_letter).max() <= within * abs(by_letter).max()
+    scene, even_s = tank(name), np.full(len(velocity), interval_s)
+    by_letter = unsteady_n(scene, velocity, np.diff(velocity, axis=0, prepend=velocity[:1]) / interval_s, even_s)
+    assert abs(force(scene, velocity, even_s) - by_letter).max() <= within * abs(by_letter).max()
 
 
 @pytest.mark.parametrize(("filter_s", "smoothing_s"), [(0.004, 0.03), (0.021, 0.006)])
@@ -88,19 +88,19 @@ def test_no_motion_gains_energy(name):
 
 def test_a_body_that_moves_already_meets_steady_drag_at_once():
     velocity = np.tile([0.1, 0.2, -0.2], (200, 1))
-    felt = force(tank("glycerin"), velocity)
+    force_n = force(tank("glycerin"), velocity)
     stokes_nspm = 3 * np.pi * 1.41 * 0.068
     steady = -stokes_nspm * finite_reynolds(1261 * 0.3 * 0.068 / 1.41) * velocity[0]
-    assert felt == pytest.approx(np.tile(steady, (200, 1)), rel=1e-9)
+    assert force_n == pytest.approx(np.tile(steady, (200, 1)), rel=1e-9)
 
 
 @pytest.mark.slow
 @compiled
-def test_after_a_stop_the_wake_pushes_on_and_what_is_remembered_ends_as_zero():
+def test_after_a_stop_the_wake_pushes_on_and_its_memory_decays_to_zero():
     velocity = np.zeros((60_000, 3))
     velocity[10:400] = [0.5, 0.0, 0.0]
-    felt = force(tank("glycerin"), velocity)[:, 0]
-    assert felt[399] < 0 < felt[450] < -felt[399]
+    force_n = force(tank("glycerin"), velocity)[:, 0]
+    assert force_n[399] < 0 < force_n[450] < -force_n[399]
     hand = Hand(tank("tar", effects=("unsteady_drag",)))
     hand.sweep(0.2, 50)
     for _ in range(3000):
@@ -111,9 +111,9 @@ def test_after_a_stop_the_wake_pushes_on_and_what_is_remembered_ends_as_zero():
 
 
 def sent_and_due(name, scale, hand_mps, stop=0):
-    """Return along x the force sent, that which is due, late drag, and its limits at the speeds u and |w|."""
-    felt = tank(name).model_copy(update={"scale": scale, "force_limit_n": 20.0})
-    hand = Hand(felt)
+    """Return along x the sent force, the expected force, late drag, and its limits at the speeds u and |w|."""
+    scene = tank(name).model_copy(update={"scale": scale, "force_limit_n": 20.0})
+    hand = Hand(scene)
     sample = hand.sweep(hand_mps, 800)[-1]
     for _ in range(stop):
         sample = hand.tick((hand_mps * 0.8, 0.0, 0.0))
@@ -131,7 +131,7 @@ def sent_and_due(name, scale, hand_mps, stop=0):
 @pytest.mark.parametrize(
     ("name", "scale", "limited"), [("tar", 3.0, True), ("glycerin", 40.0, True), ("honey", 3.0, False)]
 )
-def test_late_drag_is_held_to_what_the_slope_limit_leaves(name, scale, limited):
+def test_late_drag_is_limited_to_the_remaining_slope(name, scale, limited):
     sent_n, due_n, late_n, most_n, _ = sent_and_due(name, scale, 0.1)
     assert sent_n == pytest.approx(due_n, rel=1e-9)
     assert late_n < 0
@@ -185,7 +185,7 @@ def test_the_reserve_is_that_of_added_mass_and_history_together():
 
 
 def test_under_a_surface_drag_goes_by_the_area_and_inertia_by_the_volume():
-    """A ball a quarter under: its frontal area and its volume shares are those of the surface."""
+    """A quarter of the ball is submerged; its shares of frontal area and volume follow from the surface."""
     pool = liquid(1261, viscosity_pa_s=1.41, region=Box(size_m=(2, 2, 2)), effects=("unsteady_drag", "surface"))
     whole = pool.model_copy(update={"effects": ("unsteady_drag",)})
     shallow_m = 1.0 + 0.017  # of the centre: a quarter of the diameter is in

@@ -12,8 +12,8 @@ from tests.haptics.tails import LEGS, PACES, difference, tank, wakes, walk
 @settings(max_examples=examples(120), deadline=None)
 @given(wake=wakes(), legs=LEGS, pace=st.sampled_from(list(PACES)), rate_hz=st.sampled_from([1000.0, 400.0, 2000.0]))
 def test_the_wake_equals_its_definition(wake, legs, pace, rate_hz):
-    felt = scene(liquid(wake=wake), knee=UNBENT, rate_hz=rate_hz)
-    assert difference(felt, walk(legs, pace)) <= 1e-9
+    wake_scene = scene(liquid(wake=wake), knee=UNBENT, rate_hz=rate_hz)
+    assert difference(wake_scene, walk(legs, pace)) <= 1e-9
 
 
 def test_steady_straight_motion_fills_the_wake_to_the_known_gain():

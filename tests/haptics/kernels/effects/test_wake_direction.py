@@ -1,4 +1,4 @@
-"""Where the wake pushes: neither a hand's bow nor its tremor may decide that (thesis' water, as it is felt)."""
+"""The direction of the wake's push depends neither on the curvature of a stroke nor on tremor (thesis' water)."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ HALF_M = 0.03
 
 
 def felt_at(places_m):
-    """Return what a hand feels in water at these places (n, 3), one a millisecond."""
+    """Return the force on a hand in water at these positions (n, 3), one per millisecond."""
     return simulate(WATER, Motion(np.arange(len(places_m)) / 1000, WATER.scale * places_m))
 
 

@@ -1,4 +1,4 @@
-"""Lag and noise of estimators, and those that were removed from the program."""
+"""Lag and noise of estimators, and refusal of removed ones."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ COUNT_M = 38e-6
 PEAK_MPS = 0.03 * 2 * np.pi * 1.5
 
 
-def felt(velocity, position_m, interval_s=None):
+def estimated_velocities(velocity, position_m, interval_s=None):
     """Return the velocities (n, 3) that an estimator finds in positions (n, 3) or (n,) along x, hand frame."""
     position_m = np.asarray(position_m, float)
     if position_m.ndim == 1:
@@ -29,10 +29,10 @@ def quantised(x_m):
     return np.round(np.asarray(x_m) / COUNT_M) * COUNT_M
 
 
-def late(velocity, seconds=4):
+def lag_and_noise(velocity, seconds=4):
     """Return lag [ms] and noise [mm/s] on a quantised sinusoid of ±30 mm at 1.5 Hz, without the first 0.5 s."""
     t_s = np.arange(seconds * 1000) / 1000
-    v = felt(velocity, quantised(0.03 * np.sin(3 * np.pi * t_s + 0.3)))[500:, 0]
+    v = estimated_velocities(velocity, quantised(0.03 * np.sin(3 * np.pi * t_s + 0.3)))[500:, 0]
     lags_s = np.arange(0, 12.1, 0.25) / 1000
     errors = [np.sqrt(np.mean((v - PEAK_MPS * np.cos(3 * np.pi * (t_s[500:] - lag) + 0.3)) ** 2)) for lag in lags_s]
     best = int(np.argmin(errors))
@@ -46,13 +46,13 @@ def late(velocity, seconds=4):
     ids=lambda value: getattr(value, "kind", value),
 )
 def test_lag_and_noise_on_a_quantised_sinusoid(velocity, lag_ms, noise_mmps):
-    lag, noise = late(velocity)
+    lag, noise = lag_and_noise(velocity)
     assert lag == pytest.approx(lag_ms, abs=0.3)
     assert noise == pytest.approx(noise_mmps, rel=0.1)
 
 
 @pytest.mark.parametrize("kind", ["line", "foaw", "lead"])
-def test_an_estimator_of_earlier_versions_computes_no_force_and_says_what_to_write(kind):
+def test_a_removed_estimator_is_refused_with_its_replacements(kind):
     with pytest.raises(
         StudyError, match=f'"{kind}" has been removed from the program: write "ewma", "kalman" or "raw"'
     ):

@@ -1,4 +1,4 @@
-"""What holds for each velocity estimator of the registry."""
+"""Properties that every velocity estimator of the registry has."""
 
 import numpy as np
 import pytest
@@ -21,17 +21,17 @@ def scene(name):
     return with_parameter(EMPTY, "velocity.kind", name)
 
 
-def found(name, place_m, interval_s=1e-3):
+def estimated_velocities(name, place_m, interval_s=1e-3):
     """Return the velocities (n, 3) that an estimator finds in places (n, 3)."""
-    felt = scene(name).model_copy(update={"rate_hz": 1 / interval_s})
-    return vectors(simulate(felt, Motion(np.arange(len(place_m)) * interval_s, place_m)), "velocity")
+    estimator_scene = scene(name).model_copy(update={"rate_hz": 1 / interval_s})
+    return vectors(simulate(estimator_scene, Motion(np.arange(len(place_m)) * interval_s, place_m)), "velocity")
 
 
 @each
 @pytest.mark.parametrize("interval_s", [0.5e-3, 1e-3, 4e-3])
 def test_rest_and_the_first_sample_have_no_velocity_and_an_even_motion_is_found(name, interval_s):
-    assert not found(name, np.full((30, 3), 0.02), interval_s).any()
-    v = found(name, np.outer(np.arange(400) * interval_s, [0.3, -0.1, 0.2]), interval_s)
+    assert not estimated_velocities(name, np.full((30, 3), 0.02), interval_s).any()
+    v = estimated_velocities(name, np.outer(np.arange(400) * interval_s, [0.3, -0.1, 0.2]), interval_s)
     assert not v[0].any()
     assert v[-1] == pytest.approx([0.3, -0.1, 0.2], rel=1e-3)
 
@@ -41,13 +41,13 @@ def test_no_direction_is_preferred(name):
     random = np.random.default_rng(5)
     place_m = np.cumsum(random.normal(0, 1e-6, (200, 3)).cumsum(axis=0), axis=0)
     turn, _ = np.linalg.qr(random.normal(size=(3, 3)))
-    straight = found(name, place_m)
-    assert found(name, place_m @ turn.T) == pytest.approx(straight @ turn.T, abs=1e-9)
+    straight = estimated_velocities(name, place_m)
+    assert estimated_velocities(name, place_m @ turn.T) == pytest.approx(straight @ turn.T, abs=1e-9)
     assert np.abs(straight).max() > 1e-3
 
 
 @each
-def test_what_was_before_a_loss_of_the_body_is_forgotten(name):
+def test_positions_before_a_loss_of_the_body_are_forgotten(name):
     hand = Hand(scene(name), dynamics=MEASURED)
     hand.sweep(0.2, 50)
     for _ in range(5):
@@ -69,9 +69,9 @@ def test_a_model_made_with_a_capacity_takes_it(name):
 @pytest.mark.skipif(not COMPILED, reason="thousands of ticks")
 @each
 @pytest.mark.parametrize("hz", [1.0, 5.0])
-def test_checks_know_what_it_passes_of_a_swing(name, hz):
+def test_the_stated_gain_at_a_frequency_is_that_of_the_estimator(name, hz):
     t_s, w = np.arange(3000) / 1000, 2 * np.pi * hz
     x_m = 0.02 * np.sin(w * t_s)
-    v = found(name, np.column_stack([x_m, 0 * x_m, 0 * x_m]))[1000:, 0]
+    v = estimated_velocities(name, np.column_stack([x_m, 0 * x_m, 0 * x_m]))[1000:, 0]
     true = 0.02 * w * np.cos(w * t_s)[1000:]
     assert passed_share(scene(name).velocity, 1000, hz) == pytest.approx((v @ true) / (true @ true), abs=0.04)

@@ -1,4 +1,4 @@
-"""The Kalman filter of velocity: against its definition, against EWMA, in closed loops, and in trouble."""
+"""The Kalman filter of velocity: compared with its definition and EWMA, in closed loops, and after faults."""
 
 import math
 
@@ -31,14 +31,14 @@ def device(delay_ticks=1, period_s=1e-3):
     return Dynamics(delay_s=delay_ticks * period_s, count_m=COUNT_M, mass_kg=0.1)
 
 
-def hand(velocity=None, *, delay_ticks=1, felt=WATER, rules=CURRENT):
-    """Return a hand on such a device."""
-    moved = Hand(felt.model_copy(update={"velocity": velocity or Kalman()}), dynamics=device(delay_ticks), rules=rules)
+def hand(velocity=None, *, delay_ticks=1, scene=WATER, rules=CURRENT):
+    """Return a hand on the device with a reply delay."""
+    moved = Hand(scene.model_copy(update={"velocity": velocity or Kalman()}), dynamics=device(delay_ticks), rules=rules)
     moved.safety[0].delay_ticks = delay_ticks
     return moved
 
 
-def felt(velocity, position_m, interval_s=1e-3):
+def estimated_velocities(velocity, position_m, interval_s=1e-3):
     """Return the velocities (n, 3) found in positions (n, 3) or (n,) along x, as an encoder of 38 µm counts them."""
     position_m = np.round(np.asarray(position_m, float) / COUNT_M) * COUNT_M
     if position_m.ndim == 1:
@@ -50,7 +50,7 @@ def felt(velocity, position_m, interval_s=1e-3):
 def literal(position_m, interval_s, force_n, rules=CURRENT):
     """Return the velocities (n, 3) by the definition: positions (n, 3), intervals (n,), acting forces (n, 3)."""
     x, response, v = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((len(position_m), 3))  # rows of x: axes
-    found, smooth, smooth_before = np.zeros_like(v), np.zeros(3), np.zeros(3)
+    estimates, smooth, smooth_before = np.zeros_like(v), np.zeros(3), np.zeros(3)
     elapsed_s, checks, sums, false_share = 0.0, [], np.zeros(2), 0.0
     p = np.diag([COUNT_M**2 / 2, kalman.FIRST_SPEED_MPS**2, kalman.FIRST_ACCELERATION_MPS2**2])
     theta, spread = kalman.USUAL_PER_KG, kalman.USUAL_PER_KG**2 / 4
@@ -89,16 +89,16 @@ def literal(position_m, interval_s, force_n, rules=CURRENT):
             sums += weight * (np.array([old_lead @ old_lead, old_lead @ (checked - way / lasted_s)]) - sums)
             false_share = sums[1] / (sums[0] + (COUNT_M / kalman.LEAST_LEAD_S) ** 2) - rules.tolerated_false_lead
             false_share = np.clip(rules.false_lead_gain * false_share, 0, 1)
-        found[k] = v[k] - false_share * lead
-    return found
+        estimates[k] = v[k] - false_share * lead
+    return estimates
 
 
 @pytest.mark.parametrize("rules", [VERSIONS[9], VERSIONS[11], CURRENT])
 @pytest.mark.parametrize("delay_ticks", [0, 1, 3])
 def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks, rules):
     random = np.random.default_rng(4)
-    moved = hand(delay_ticks=delay_ticks, felt=HONEY.model_copy(update={"scale": 3.0, "knee": UNBENT}), rules=rules)
-    places, intervals, forces, found = [], [], [], []
+    moved = hand(delay_ticks=delay_ticks, scene=HONEY.model_copy(update={"scale": 3.0, "knee": UNBENT}), rules=rules)
+    places, intervals, forces, estimates = [], [], [], []
     sent = [np.zeros(3)] * (delay_ticks + 1)
     impulse, since_s = np.zeros(3), 0.0
     speed = np.zeros(3)
@@ -115,11 +115,11 @@ def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks, rules):
             places.append(place)
             intervals.append(since_s or 1e-3)
             forces.append(impulse / since_s if since_s else np.zeros(3))
-            found.append(np.array(sample.velocity_mps) / 3.0)
+            estimates.append(np.array(sample.velocity_mps) / 3.0)
             impulse, since_s = np.zeros(3), 0.0
         sent.append(np.array(sample.device_force_n))
     expected = literal(np.array(places), intervals, forces, rules)
-    assert np.array(found) == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+    assert np.array(estimates) == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
     assert np.abs(expected).max() > 0.05
     blind = literal(np.array(places), intervals, np.zeros((len(places), 3)), VERSIONS[9])
     assert np.abs(expected - blind).max() > 0.005 * np.abs(expected).max()
@@ -127,7 +127,7 @@ def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks, rules):
 
 def measured_mps(position_m, *, rules=CURRENT, velocity=None):
     """Return velocities (n,) from positions (n,) [m] along x, as an encoder of 38 µm counts them."""
-    moved = hand(velocity, felt=WATER.model_copy(update={"scale": 1.0, "knee": UNBENT}), rules=rules)
+    moved = hand(velocity, scene=WATER.model_copy(update={"scale": 1.0, "knee": UNBENT}), rules=rules)
     counted_m = np.round(np.column_stack([position_m, 0 * position_m, 0 * position_m]) / COUNT_M) * COUNT_M
     return np.array([moved.tick(place).velocity_mps[0] for place in counted_m])
 
@@ -168,7 +168,7 @@ def test_a_vibration_of_two_counts_leaves_it_as_accurate_as_ewma():
 
 @compiled
 def test_the_limit_holds_where_the_delay_is_wrong_by_one():
-    """At 1 kHz and one tick the limit itself is that of a loop that is one tick later than believed."""
+    """At 1 kHz and one tick, the limit is that of a loop one tick later than believed."""
     assert damping_limits(1e-3, 1, Kalman()).drag_nspm <= boundary_nspm(Kalman(), 1e-3, 2, believed=1) * 1.01
     assert damping_limits(1e-3, 1, Kalman()).drag_nspm >= 53
     for entry in slope_limit_table():
@@ -178,10 +178,10 @@ def test_the_limit_holds_where_the_delay_is_wrong_by_one():
 
 @compiled
 def test_a_motion_that_breaks_off_leaves_no_liquid_weak():
-    """The imposed stroke of 8 Hz goes over into slow stirring from one sample to the next, at 0.5 m/s."""
-    for found in measure_withheld_force(["honey"], ["kalman"]):
-        assert found.lasting < 0.005
-        assert found.quick < 0.02
+    """The imposed stroke of 8 Hz changes into slow stirring at 0.5 m/s between two samples."""
+    for withheld in measure_withheld_force(["honey"], ["kalman"]):
+        assert withheld.lasting < 0.005
+        assert withheld.quick < 0.02
 
 
 @compiled
@@ -199,9 +199,9 @@ def test_nothing_of_a_motion_is_left_in_denormal_numbers():
 
 
 def test_a_device_that_measures_no_delay_gets_ewma():
-    found, usual = (Hand(WATER.model_copy(update={"velocity": it})) for it in (Kalman(), Ewma()))
-    assert found.model.parameters[0].estimator == NAMED["ewma"].code
-    assert [s.tobytes() for s in found.sweep(0.2, 40)] == [s.tobytes() for s in usual.sweep(0.2, 40)]
+    kalman_hand, ewma_hand = (Hand(WATER.model_copy(update={"velocity": it})) for it in (Kalman(), Ewma()))
+    assert kalman_hand.model.parameters[0].estimator == NAMED["ewma"].code
+    assert [s.tobytes() for s in kalman_hand.sweep(0.2, 40)] == [s.tobytes() for s in ewma_hand.sweep(0.2, 40)]
 
 
 def strokes(ticks, hz=2.0):
@@ -227,7 +227,7 @@ def test_where_the_delay_changes_ewma_takes_over_without_a_jump_and_gives_back_a
     assert v[400:1300] == pytest.approx(ewma[400:1300], abs=1e-4)
 
 
-def test_positions_far_coarser_than_the_device_says_are_trouble():
+def test_positions_coarser_than_stated_are_detected_as_a_fault():
     moved = hand(rules=VERSIONS[2])  # later ones reject such positions
     random = np.random.default_rng(3)
     quiet = [moved.tick(place) for place in np.round(strokes(300) / COUNT_M) * COUNT_M]
@@ -240,7 +240,7 @@ def test_positions_far_coarser_than_the_device_says_are_trouble():
     assert not calm[-1].limiters & LIMITER_ESTIMATOR
 
 
-def test_a_repeated_sample_in_motion_says_nothing_and_a_stop_is_believed_at_its_second_sample():
+def test_a_repeated_sample_is_ignored_and_a_stop_accepted_at_its_second_sample():
     places = np.round(strokes(400) / COUNT_M) * COUNT_M
     repeated = places.copy()
     repeated[[300, 330]] = places[[299, 329]]
@@ -257,7 +257,7 @@ def test_a_repeated_sample_in_motion_says_nothing_and_a_stop_is_believed_at_its_
         assert not slow.model.state[0].kalman.repeated
 
 
-def test_what_it_did_is_computed_again_to_the_last_bit():
+def test_a_replay_of_the_filter_is_exact_to_the_last_bit():
     moved = hand()
     samples = records(moved.sample.dtype, 700)
     for k, place in enumerate(strokes(700)):

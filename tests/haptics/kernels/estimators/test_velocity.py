@@ -13,7 +13,7 @@ from study_app.haptics.runtime.pack import pack, pack_into
 from tests.haptics.scenes import UNBENT, examples, moving, scene, vectors
 
 
-def felt(x_m, rate_hz=1000.0, alpha=0.1, interval_s=None):
+def estimated_velocity(x_m, rate_hz=1000.0, alpha=0.1, interval_s=None):
     """Return the velocity along x for positions x_m."""
     t_s = np.arange(len(x_m)) / rate_hz if interval_s is None else np.cumsum(interval_s)
     position_m = np.column_stack([x_m, np.zeros(len(x_m)), np.zeros(len(x_m))])
@@ -24,13 +24,13 @@ def felt(x_m, rate_hz=1000.0, alpha=0.1, interval_s=None):
 @pytest.mark.compiled
 def test_steady_acceleration_is_followed_nine_samples_late():
     t_s = np.arange(3000) / 1000
-    v = felt(0.5 * t_s**2)
+    v = estimated_velocity(0.5 * t_s**2)
     ideal_of_the_difference = t_s - 0.5e-3
     assert (ideal_of_the_difference - v)[-1] == pytest.approx(9e-3, rel=1e-6)
 
 
 def test_a_step_of_speed_is_there_to_99_percent_after_44_samples():
-    v = felt(np.arange(100) * 1e-3)
+    v = estimated_velocity(np.arange(100) * 1e-3)
     assert v[43] < 0.99 <= v[44]
     assert v[1:] == pytest.approx(1 - 0.9 ** np.arange(1, 100))
 

@@ -1,4 +1,4 @@
-"""Hazards 13-16: what becomes of a force on its way out, of numbers next to nothing, and at the ends of a drag law."""
+"""Hazards 13-16: the way of a force to the device, tiny numbers, and the ends of a drag law."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_hazard_13_clamping_does_not_tick_the_force(density):
 @pytest.mark.skipif(not COMPILED, reason="minutes are for compiled code")
 @pytest.mark.parametrize("name", THESIS)
 def test_hazard_14_a_long_rest_leaves_exactly_nothing(name):
-    """What decays by a tenth a tick leaves the range of ordinary numbers after 6700 of them."""
+    """A value that decays by a tenth per tick becomes subnormal after 6700 ticks."""
     hand = Hand(THESIS[name])
     place = hand.sweep(0.2, 300)[-1].position_m + 1e-4
     for _ in range(100):
@@ -49,8 +49,8 @@ def test_hazard_14_a_long_rest_leaves_exactly_nothing(name):
 
 
 @pytest.mark.skipif(not COMPILED, reason="minutes are for compiled code")
-def test_hazard_14_what_was_smoothed_of_an_acceleration_ends_as_nothing():
-    """An average over 25 ms leaves the range of ordinary numbers after 18 s; the kernel's tail lasts far longer."""
+def test_hazard_14_a_smoothed_acceleration_decays_to_zero():
+    """An average over 25 ms becomes subnormal after 18 s; the kernel's tail lasts far longer."""
     effects = ("drag", "added_mass", "history")
     hand = Hand(scene(liquid(1400, viscosity_pa_s=2.0, effects=effects)))
     place = hand.sweep(0.2, 300)[-1].position_m + 1e-4
@@ -69,11 +69,11 @@ def test_hazard_14_what_was_smoothed_of_an_acceleration_ends_as_nothing():
 def test_hazard_15_as_the_reynolds_number_vanishes_drag_is_stokes(law, speed_mps):
     stokes_n = 3 * np.pi * 100 * 0.068 * speed_mps
     assert drag_n(law, speed_mps, **TAR) == pytest.approx(stokes_n, rel=1e-6)
-    felt = simulate(viscous(law, TAR), moving([(0.0, 0.0, 0.0), (speed_mps, 0.0, 0.0)]))
-    assert felt.fx_n[0] == 0.0
-    assert np.isfinite(vectors(felt, "force")).all()
+    table = simulate(viscous(law, TAR), moving([(0.0, 0.0, 0.0), (speed_mps, 0.0, 0.0)]))
+    assert table.fx_n[0] == 0.0
+    assert np.isfinite(vectors(table, "force")).all()
     # The square of a speed under 1e-154 m/s is no number any more: its force is nothing, and right to 1e-150 N.
-    assert felt.fx_n[1] == pytest.approx(-stokes_n, rel=1e-6, abs=1e-150)
+    assert table.fx_n[1] == pytest.approx(-stokes_n, rel=1e-6, abs=1e-150)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -85,5 +85,5 @@ def test_hazard_16_beyond_its_range_a_coefficient_stays(law):
     assert 0.43 < held < 0.48
     assert [coefficient(re) for re in (2.1e5, 1e6, 1e9)] == pytest.approx([held] * 3)
     at_mps = np.array([3.0, 5.0, 20.0])  # Re 2.03e5, 3.4e5, 1.4e6
-    felt = simulate(viscous(law, WATER), moving(np.outer(at_mps, [1.0, 0.0, 0.0]))).fx_n
-    assert felt == pytest.approx(-0.5 * 998.2 * held * np.pi * 0.034**2 * at_mps**2)
+    force_n = simulate(viscous(law, WATER), moving(np.outer(at_mps, [1.0, 0.0, 0.0]))).fx_n
+    assert force_n == pytest.approx(-0.5 * 998.2 * held * np.pi * 0.034**2 * at_mps**2)

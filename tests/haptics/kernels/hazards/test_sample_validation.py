@@ -1,4 +1,4 @@
-"""Hazards 6-12: what comes in as positions and times, and what directions are made of it."""
+"""Hazards 6-12: incoming positions and times, and the directions that are computed from them."""
 
 import numpy as np
 import pytest
@@ -30,11 +30,11 @@ ALL = {**THESIS, **EVERYTHING}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("felt", [tank(), tank(exponent=0.25), tank(exponent=2.0)], ids=["1", "1/4", "2"])
+@pytest.mark.parametrize("scene", [tank(), tank(exponent=0.25), tank(exponent=2.0)], ids=["1", "1/4", "2"])
 @pytest.mark.parametrize("speed_mps", [0.0, 5e-324, 1e-300, 1e-4])
-def test_hazard_06_rest_has_no_direction(felt, speed_mps):
+def test_hazard_06_rest_has_no_direction(scene, speed_mps):
     resting = np.tile([speed_mps, 0.0, 0.0], (10_000 if COMPILED else 150, 1))
-    table = simulate(felt, moving(np.concatenate([resting[:20], np.tile([0, 0, -1.0], (50, 1)), resting])))
+    table = simulate(scene, moving(np.concatenate([resting[:20], np.tile([0, 0, -1.0], (50, 1)), resting])))
     assert np.isfinite(vectors(table, "force")).all()
     assert not vectors(table, "wake")[:21].any()
     moved = vectors(table, "wake")[22:170]
@@ -71,8 +71,8 @@ def test_hazard_07_no_rounding_breaks_a_straight_line_even_at_a_breaking_angle_o
     random = np.random.default_rng(1)
     for heading in random.uniform(0, 2 * np.pi, 20):
         speeds = random.uniform(0.01, 9, 60)
-        felt = tank(breaking_angle_deg=0.0).model_copy(update={"scale": 1.0, "velocity": Ewma(alpha=1.0)})
-        hand = Hand(felt, rules=VERSIONS[2])  # no hand changes its speed so suddenly
+        scene = tank(breaking_angle_deg=0.0).model_copy(update={"scale": 1.0, "velocity": Ewma(alpha=1.0)})
+        hand = Hand(scene, rules=VERSIONS[2])  # no hand changes its speed so suddenly
         for path_m in np.cumsum(speeds) * 1e-3:
             hand.tick(path_m * np.array([np.cos(heading), 0, np.sin(heading)]))
         assert hand.model.liquid_states[0].wake.held > 50
@@ -85,12 +85,12 @@ def test_hazard_07_no_rounding_breaks_a_straight_line_even_at_a_breaking_angle_o
 def test_hazard_08_an_encoders_chatter_does_not_split_slow_motion(heading, hand_mps):
     path_m = hand_mps * np.arange(1, 3001 if COMPILED else 400) / 1000 + 1.23e-5
     places = np.outer(path_m, [np.cos(heading), 0, np.sin(heading)])
-    smooth, counted = Hand(WATER), Hand(WATER)
+    smooth, encoded = Hand(WATER), Hand(WATER)
     for place in places:
         expected = smooth.tick(place)
-        felt = counted.tick(np.round(place / 38e-6) * 38e-6)
-        assert np.linalg.norm(felt.force_n - expected.force_n) < 0.02
-    tracks = counted.model.liquid_states[0].wake
+        sample = encoded.tick(np.round(place / 38e-6) * 38e-6)
+        assert np.linalg.norm(sample.force_n - expected.force_n) < 0.02
+    tracks = encoded.model.liquid_states[0].wake
     if heading == 0.0:
         assert tracks.last_segment - tracks.first_segment + 1 <= 2
 
@@ -107,12 +107,12 @@ def path_at(times_s):
 @pytest.mark.parametrize("decay", [0.999975, 0.9997])
 def test_hazard_09_the_force_does_not_depend_on_the_time_between_samples(pace, decay):
     wake = WATER.liquids[0].wake.model_copy(update={"decay": decay})
-    felt = WATER.model_copy(update={"liquids": (WATER.liquids[0].model_copy(update={"wake": wake}),)})
+    scene = WATER.model_copy(update={"liquids": (WATER.liquids[0].model_copy(update={"wake": wake}),)})
     rate_hz = 1000.0 / np.mean(pace)
     usual_s = np.arange(3000) / 1000
-    usual = vectors(simulate(felt, Motion(usual_s, path_at(usual_s))), "force")
+    usual = vectors(simulate(scene, Motion(usual_s, path_at(usual_s))), "force")
     other_s = np.cumsum(1e-3 * np.resize(pace, round(3 * rate_hz))) - 1e-3 * pace[0]
-    other = simulate(felt.model_copy(update={"rate_hz": rate_hz}), Motion(other_s, path_at(other_s)))
+    other = simulate(scene.model_copy(update={"rate_hz": rate_hz}), Motion(other_s, path_at(other_s)))
     expected = np.column_stack([np.interp(other_s, usual_s, usual[:, axis]) for axis in range(3)])
     error = np.linalg.norm(vectors(other, "force") - expected, axis=1)
     assert error.max() <= 0.02 * np.linalg.norm(usual, axis=1).max()
@@ -123,8 +123,8 @@ def test_hazard_09_the_force_does_not_depend_on_the_time_between_samples(pace, d
     [(0, 0.2e-3), (1, 0.2e-3), (-TICK_NS, 0.2e-3), (-3 * 10**9, 0.2e-3), (10**8 + 1, 20e-3), (10**10, 20e-3)],
 )
 def test_hazard_10_a_clock_that_jumps_counts_as_02_to_20_ms(jump_ns, taken_s):
-    felt = tank(decay=0.95).model_copy(update={"scale": 1.0})
-    hand = Hand(felt)
+    scene = tank(decay=0.95).model_copy(update={"scale": 1.0})
+    hand = Hand(scene)
     before = [hand.tick((2e-4 * k, 0, 0)) for k in range(61)][-1]
     jumped = hand.tick((2e-4 * 61, 0, 0), after_ns=jump_ns)
     moved = before.velocity_mps[0] + (1 - 0.9 ** (taken_s / 1e-3)) * (2e-4 / taken_s - before.velocity_mps[0])
@@ -134,17 +134,17 @@ def test_hazard_10_a_clock_that_jumps_counts_as_02_to_20_ms(jump_ns, taken_s):
     assert after.wake_mps[0] == pytest.approx(stirred)
 
 
-@pytest.mark.parametrize("felt", ALL.values(), ids=ALL)
+@pytest.mark.parametrize("scene", ALL.values(), ids=ALL)
 @pytest.mark.parametrize("jump_ns", [0, 1, 10**8, 10**10, -TICK_NS, -(10**12)])
-def test_hazard_10_a_clock_that_jumps_does_no_harm(felt, jump_ns):
-    hand, before = Hand(felt), np.zeros(3)
+def test_hazard_10_a_clock_that_jumps_does_no_harm(scene, jump_ns):
+    hand, before = Hand(scene), np.zeros(3)
     for k in range(160):
         sample = hand.tick((0.0002 * k, -0.01, 0.0), after_ns=jump_ns if k == 60 else TICK_NS)
         assert np.isfinite(sample.force_n).all()
         assert np.linalg.norm(sample.device_force_n) <= 8 * (1 + 1e-12)
         assert np.linalg.norm(sample.device_force_n - before) <= SLEW_N + 1e-9
         before = sample.device_force_n.copy()
-    assert sample.velocity_mps[0] == pytest.approx(0.2 * felt.scale, rel=1e-3)
+    assert sample.velocity_mps[0] == pytest.approx(0.2 * scene.scale, rel=1e-3)
     assert sample.limiters & LIMITER_GLITCH == 0
 
 
@@ -152,11 +152,11 @@ NONSENSE = [(np.nan,) * 3, (0.0, np.inf, 0.0), (-np.inf, 0.0, np.nan), (1e300, 0
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("felt", ALL.values(), ids=ALL)
+@pytest.mark.parametrize("scene", ALL.values(), ids=ALL)
 @pytest.mark.parametrize("first", [False, True], ids=["later", "first"])
-def test_hazard_11_after_a_spell_of_nonsense_the_model_recovers_within_ten_ticks(felt, first):
+def test_hazard_11_after_a_spell_of_nonsense_the_model_recovers_within_ten_ticks(scene, first):
     rng = np.random.default_rng(3)
-    hand, calm = Hand(felt), Hand(felt)
+    hand, calm = Hand(scene), Hand(scene)
     for k in range(200):
         place = (0.02 * np.sin(0.01 * k), -0.01, 0.0)
         nonsense = rng.random() < 0.1 or (first and k < 3)
@@ -165,17 +165,17 @@ def test_hazard_11_after_a_spell_of_nonsense_the_model_recovers_within_ten_ticks
         calm.tick(place)
         assert np.isfinite(all_numbers(hand.model)).all()
     for k in range(200, 210):
-        after, expected = (one.tick((0.02 * np.sin(0.01 * k), -0.01, 0.0)) for one in (hand, calm))
+        after, expected = (moved_hand.tick((0.02 * np.sin(0.01 * k), -0.01, 0.0)) for moved_hand in (hand, calm))
     assert after.velocity_mps == pytest.approx(expected.velocity_mps, rel=0.02, abs=1e-3)
     # What was refused is not in the wake: one in ten of its elements.
     assert np.linalg.norm(after.force_n - expected.force_n) < 0.12 * np.linalg.norm(expected.force_n)
     assert after.limiters & LIMITER_GLITCH == 0
 
 
-@pytest.mark.parametrize("felt", ALL.values(), ids=ALL)
+@pytest.mark.parametrize("scene", ALL.values(), ids=ALL)
 @pytest.mark.parametrize("far_m", [10.1, 1e155, 1e300, 1.7e308])
-def test_hazard_11_no_place_beyond_a_hands_reach_is_a_new_beginning(felt, far_m):
-    hand = Hand(felt)
+def test_hazard_11_no_place_beyond_a_hands_reach_is_a_new_beginning(scene, far_m):
+    hand = Hand(scene)
     hand.sweep(0.1, 200)
     for k in range(40):
         lost = hand.tick((0.0, -far_m, far_m * (1 - 1e-12 * (k % 2))))
@@ -187,10 +187,10 @@ def test_hazard_11_no_place_beyond_a_hands_reach_is_a_new_beginning(felt, far_m)
     assert np.isfinite(all_numbers(hand.model)).all()
 
 
-@pytest.mark.parametrize("felt", ALL.values(), ids=ALL)
+@pytest.mark.parametrize("scene", ALL.values(), ids=ALL)
 @pytest.mark.parametrize("jump_m", [(0.1, 0, 0), (0, -0.1, 0), (0.03, 0.03, 0.03)])
-def test_hazard_12_a_jump_of_100_metres_a_second_is_not_felt(felt, jump_m):
-    hand = Hand(felt)
+def test_hazard_12_a_jump_of_100_metres_a_second_is_not_felt(scene, jump_m):
+    hand = Hand(scene)
     for k in range(40):
         before = hand.tick((2e-4 * k, -0.01, 0.0))
     glitch = hand.tick(np.array([0.008, -0.01, 0.0]) + jump_m)
@@ -204,9 +204,9 @@ def test_hazard_12_a_jump_of_100_metres_a_second_is_not_felt(felt, jump_m):
 def test_hazard_12_the_fastest_hand_that_is_believed_meets_the_knee_before_its_speed_is_squared():
     bent, unbent = Hand(scene(scale=10)), Hand(scene(scale=10, knee=UNBENT))
     for k in range(200):
-        felt, square = (hand.tick((9.9e-3 * k, 0.0, 0.0)) for hand in (bent, unbent))
-    assert -square.force_n[0] > 8000
+        bent_sample, unbent_sample = (hand.tick((9.9e-3 * k, 0.0, 0.0)) for hand in (bent, unbent))
+    assert -unbent_sample.force_n[0] > 8000
     lowered = 5 + np.sqrt(1 + 2 * (99 - 5)) - 1
-    assert felt.velocity_mps[0] == pytest.approx(lowered, rel=1e-6)
-    assert -felt.force_n[0] < 300
-    assert np.linalg.norm(felt.device_force_n) <= 8 * (1 + 1e-12)
+    assert bent_sample.velocity_mps[0] == pytest.approx(lowered, rel=1e-6)
+    assert -bent_sample.force_n[0] < 300
+    assert np.linalg.norm(bent_sample.device_force_n) <= 8 * (1 + 1e-12)

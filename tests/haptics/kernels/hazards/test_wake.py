@@ -1,4 +1,4 @@
-"""Hazards 1-5, 17, 19, 20 of a wake that is kept as running sums: each was seen without its remedy."""
+"""Hazards 1-5, 17, 19, 20 of a wake that is stored as running sums: each occurred without its remedy."""
 
 import math
 
@@ -37,7 +37,7 @@ LAMBDA = 0.999975
 
 
 def at_the_hand(**wake):
-    """Return a tank felt at scale 1 with the plain difference as velocity: what enters the wake is known exactly."""
+    """Return a scene at scale 1 with the raw difference as velocity, so that the input of the wake is known exactly."""
     return tank(**wake).model_copy(update={"scale": 1.0, "velocity": Raw()})
 
 
@@ -58,7 +58,7 @@ def test_hazard_01_the_scale_does_not_underflow_after_hours():
 
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="millions of ticks are for compiled code")
-def test_hazard_02_what_is_stored_does_not_grow_without_bound():
+def test_hazard_02_stored_numbers_do_not_grow_without_bound():
     length, angle = 1700, np.linspace(0, 2 * np.pi, 1000, endpoint=False)
     hand = Hand(at_the_hand(length=length, scaling=length, decay=LAMBDA))
     circle = 0.03 * np.column_stack([np.cos(angle), 0 * angle, np.sin(angle)])
@@ -72,7 +72,7 @@ def test_hazard_02_what_is_stored_does_not_grow_without_bound():
 
 
 def floats(dtype):
-    """Yield every dtype of numbers that are not whole, in records within records."""
+    """Yield the dtypes of all floating-point fields, including those of nested records."""
     if dtype.names:
         for name in dtype.names:
             yield from floats(dtype[name])
@@ -80,36 +80,40 @@ def floats(dtype):
         yield dtype.base
 
 
-@pytest.mark.parametrize("felt", EVERYTHING.values(), ids=EVERYTHING)
-def test_hazard_03_all_that_is_kept_has_double_precision(felt):
+@pytest.mark.parametrize("scene", EVERYTHING.values(), ids=EVERYTHING)
+def test_hazard_03_all_that_is_kept_has_double_precision(scene):
     kinds = (
-        {kind for rows in pack(felt).arrays for kind in floats(rows.dtype)} | set(floats(SAMPLE)) | set(floats(SAFETY))
+        {kind for rows in pack(scene).arrays for kind in floats(rows.dtype)} | set(floats(SAMPLE)) | set(floats(SAFETY))
     )
     assert kinds == {np.dtype(np.float64)}
 
 
 def test_hazard_03_after_5000_ticks_88_percent_of_an_element_is_left():
     ticks = 5000 if COMPILED else 500
-    felt = simulate(tank(length=6000, scaling=6000, decay=LAMBDA), moving([(1.0, 0, 0)] + [(0.0, 0, 0)] * (ticks + 1)))
-    left = (felt.wake_x_mps[ticks + 1] / felt.wake_x_mps[1]) ** (5000 / ticks)
+    table = simulate(tank(length=6000, scaling=6000, decay=LAMBDA), moving([(1.0, 0, 0)] + [(0.0, 0, 0)] * (ticks + 1)))
+    left = (table.wake_x_mps[ticks + 1] / table.wake_x_mps[1]) ** (5000 / ticks)
     assert left == pytest.approx(LAMBDA**5000, rel=1e-11)
     assert left == pytest.approx(0.8824955, abs=5e-8)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="hundreds of thousands of ticks")
-def test_hazard_04_taking_away_what_falls_off_does_not_drift():
+def test_hazard_04_removing_old_elements_does_not_drift():
     length, ticks = 5000, 400_000
     random = np.random.default_rng(4)
     fast = np.repeat(random.random(ticks // 4000) < 0.3, 4000)
     fast[-8000:] = False
     speeds = np.where(fast, 5.0, 1e-3) * (1 + random.random(ticks))
-    felt = simulate(tank(length=length, scaling=length), moving(np.outer(speeds, [1.0, 0.0, 0.0])))
-    left = [b + length for b in range(4000, ticks - 8000, 4000) if fast[b - 1] and not fast[b : b + 8000].any()]
-    assert len(left) > 10
-    for k in [*left, *random.integers(length + 1, ticks, 40), ticks - 1]:  # where the last of a burst has just left
+    table = simulate(tank(length=length, scaling=length), moving(np.outer(speeds, [1.0, 0.0, 0.0])))
+    after_bursts = [b + length for b in range(4000, ticks - 8000, 4000) if fast[b - 1] and not fast[b : b + 8000].any()]
+    assert len(after_bursts) > 10
+    for k in [
+        *after_bursts,
+        *random.integers(length + 1, ticks, 40),
+        ticks - 1,
+    ]:  # where the last of a burst has just left
         exact = math.fsum(speeds[k - length : k]) / length
-        assert felt.wake_x_mps[k] == pytest.approx(exact, rel=4e-15, abs=0.0)
+        assert table.wake_x_mps[k] == pytest.approx(exact, rel=4e-15, abs=0.0)
 
 
 @pytest.mark.slow
@@ -121,9 +125,9 @@ def test_hazard_04_a_fast_burst_that_has_fallen_off_leaves_nothing_behind(tick):
     crumb = np.zeros((length + 1, 3))
     crumb[0] = (0.001, 0.0, 0.0007)
     motion = moving(np.concatenate([burst, crumb]))
-    felt = tank(length=length, scaling=length, exponent=1.0)
-    assert difference(felt, motion) <= 1e-9
-    assert simulate(felt, motion).wake_x_mps[-1] == pytest.approx(0.001 / length, rel=1e-9)
+    scene = tank(length=length, scaling=length, exponent=1.0)
+    assert difference(scene, motion) <= 1e-9
+    assert simulate(scene, motion).wake_x_mps[-1] == pytest.approx(0.001 / length, rel=1e-9)
 
 
 @pytest.mark.compiled
@@ -145,8 +149,8 @@ def test_hazard_17_a_wake_that_would_outrun_the_body_is_refused(kind):
 @pytest.mark.parametrize("rate_hz", [250.0, 999.0, 1000.0, 2000.0])
 @pytest.mark.parametrize("length", [1, 3, 100])
 def test_hazard_17_at_no_rate_does_a_wake_outrun_the_body(length, rate_hz):
-    felt = tank(length=length, scaling=length).model_copy(update={"rate_hz": rate_hz})
-    towed = simulate(felt, moving(np.tile([2.0, 0.0, 0.0], (300, 1)), 1 / rate_hz))
+    scene = tank(length=length, scaling=length).model_copy(update={"rate_hz": rate_hz})
+    towed = simulate(scene, moving(np.tile([2.0, 0.0, 0.0], (300, 1)), 1 / rate_hz))
     assert (towed.fx_n <= 1e-12).all()
 
 
@@ -191,17 +195,17 @@ def test_hazard_19_every_element_held_is_counted_in_one_segment(seed, span_m):
         assert tracks.held <= 7
 
 
-@pytest.mark.parametrize("felt", [WATER, LIGHT_OIL], ids=["water", "light_oil"])
-def test_hazard_20_the_first_tick_of_a_motion_meets_a_liquid_at_rest(felt):
-    table = simulate(felt, moving(np.tile([1.0, 0.0, 0.0], (3, 1))))
-    assert table.fx_n[0] == pytest.approx(-WATER_FACTOR * felt.liquids[0].density_kg_m3 / 1000)
+@pytest.mark.parametrize("scene", [WATER, LIGHT_OIL], ids=["water", "light_oil"])
+def test_hazard_20_the_first_tick_of_a_motion_meets_a_liquid_at_rest(scene):
+    table = simulate(scene, moving(np.tile([1.0, 0.0, 0.0], (3, 1))))
+    assert table.fx_n[0] == pytest.approx(-WATER_FACTOR * scene.liquids[0].density_kg_m3 / 1000)
     assert table.wake_x_mps[0] == 0.0
     assert table.wake_x_mps[1] > 0.0
 
 
-@pytest.mark.parametrize("felt", [WATER, LIGHT_OIL, EVERYTHING["places"]], ids=["water", "light_oil", "places"])
-def test_hazard_20_so_does_the_hand_in_the_servo(felt):
-    hand = Hand(felt.model_copy(update={"knee": Knee(law="none")}))
+@pytest.mark.parametrize("scene", [WATER, LIGHT_OIL, EVERYTHING["places"]], ids=["water", "light_oil", "places"])
+def test_hazard_20_the_first_moving_tick_of_the_servo_meets_a_liquid_at_rest(scene):
+    hand = Hand(scene.model_copy(update={"knee": Knee(law="none")}))
     hand.tick((0.0, -0.02, 0.0))
     moved = [hand.tick((0.0003 * k, -0.02, 0.0)) for k in (1, 2)]
     assert not moved[0].wake_mps.any()

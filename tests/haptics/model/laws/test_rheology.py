@@ -39,7 +39,7 @@ def test_a_power_law_grows_by_its_index(index):
     assert force_n(table, 0.4) / force_n(table, 0.1) == pytest.approx(4**index)
 
 
-def test_the_shape_factor_is_that_of_gu_and_tanner_and_continuous():
+def test_the_shape_factor_equals_gu_and_tanner_and_is_continuous():
     assert [laws.shape_factor(n) for n in (1.0, 0.9, 0.5, 0.3)] == pytest.approx([1.0, 1.14, 1.42, 1.458])
     fine = [laws.shape_factor(n) for n in np.linspace(0.1, 1, 901)]
     assert abs(np.diff(fine)).max() <= 1.5e-3
@@ -65,7 +65,7 @@ def test_shear_thickening_is_newtonian_below_and_above_and_never_steeper_than_as
         assert (forces <= [force_n(table, v) + 1e-12 for v in speeds]).all()
 
 
-def test_flow_curves_are_those_of_the_rheometer():
+def test_flow_curves_equal_the_rheometer_curves():
     hb = HerschelBulkley(yield_stress_pa=15, consistency_pa_sn=10, flow_index=0.25)
     assert laws.stress_pa(hb, 0.0) == 15
     assert laws.stress_pa(hb, 16.0) == pytest.approx(35)
@@ -76,7 +76,7 @@ def test_flow_curves_are_those_of_the_rheometer():
     assert [laws.stress_pa(thick, it) for it in (5.0, 7.5, 10.0, 20.0)] == pytest.approx([5, 102.5, 200, 400])
 
 
-def test_the_force_grows_with_inertia_and_has_none_at_rest():
+def test_the_force_grows_with_inertia_and_is_zero_at_rest():
     liquid = tank("shampoo").liquids[0]
     slow, fast = (sum(steady_n(tank("shampoo"), liquid, v)) / force_n(liquid.non_newtonian, v) for v in (1e-7, 0.6))
     assert slow == pytest.approx(1, abs=1e-6)
@@ -114,8 +114,8 @@ def test_a_liquid_has_a_viscosity_or_a_flow_curve(effects):
 def test_the_steady_force_keeps_the_limits(name, velocity):
     tank_scene = tank(name, scale=3.0).model_copy(update={"velocity": velocity})
     for hand_mps in (0.001, 0.05, 0.3, 1.0):
-        found = steady_force(tank_scene, hand_mps)
+        steady = steady_force(tank_scene, hand_mps)
         held_n = laws.yield_n(tank_scene.liquids[0].non_newtonian, D)
-        assert found.force_n <= min(held_n + 53 * hand_mps, 8.0) + 1e-9
-        assert found.drag_n == pytest.approx(sum(steady_n(tank_scene, tank_scene.liquids[0], 3 * hand_mps)))
-        assert (found.limit is None) == (found.force_n == found.drag_n)
+        assert steady.force_n <= min(held_n + 53 * hand_mps, 8.0) + 1e-9
+        assert steady.drag_n == pytest.approx(sum(steady_n(tank_scene, tank_scene.liquids[0], 3 * hand_mps)))
+        assert (steady.limit is None) == (steady.force_n == steady.drag_n)

@@ -40,7 +40,7 @@ def test_the_system_clock_is_pythons_monotonic_clock():
     assert before <= now <= time.perf_counter_ns()
 
 
-def test_a_sleep_ends_at_its_deadline_or_later_and_says_when():
+def test_a_sleep_ends_at_its_deadline_or_later_and_returns_the_time():
     clock = SystemClock()
     deadline = clock.now_ns() + 3 * MS
     woken = sleep(clock, deadline)
@@ -81,7 +81,7 @@ def nothing(*_):
 
 @pytest.fixture
 def linux(monkeypatch):
-    """Return what asks Linux, where all is refused but what is ``granted``."""
+    """Return a function that imitates a Linux which grants only ``granted``."""
     if sys.platform != "linux":
         pytest.skip("the scheduler of Linux")
 
@@ -108,21 +108,21 @@ def test_linux_asks_for_less_where_more_is_refused(linux):
 
 
 def test_linux_takes_the_priority_that_a_limit_allows(linux, monkeypatch):
-    asked = []
+    priorities = []
     monkeypatch.setattr(clock_linux, "_PRIORITY", 60)
 
     def grant_20(_thread, _policy, parameters):
-        asked.append(parameters.sched_priority)
+        priorities.append(parameters.sched_priority)
         if parameters.sched_priority > 20:
             raise PermissionError
 
     linux("nice", rtprio=20)
     monkeypatch.setattr(os, "sched_setscheduler", grant_20)
     assert str(in_a_thread(raise_priority)) == "real-time (SCHED_FIFO 20)"
-    assert asked == [60, 20]
+    assert priorities == [60, 20]
 
 
-def test_memory_that_is_not_locked_is_said_with_its_cure():
+def test_unlocked_memory_is_reported_with_its_remedy():
     well = Grant("real-time", "SCHED_FIFO 60")
     assert str(well.with_memory(locked=True, advice="cure")) == "real-time (SCHED_FIFO 60), memory locked"
     assert str(well.with_memory(locked=False, advice="cure")) == "real-time (SCHED_FIFO 60), memory not locked; cure"
@@ -130,31 +130,31 @@ def test_memory_that_is_not_locked_is_said_with_its_cure():
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a limit of Linux")
 def test_with_a_limit_only_the_servos_own_memory_is_locked(monkeypatch):
-    """A whole process that is locked under a limit is refused memory later, wherever it asks for some."""
-    asked = []
+    """If a whole process is locked under a limit, its later allocations fail."""
+    calls = []
 
     class Library:
         def mlockall(self, flags):
-            asked.append(("all", flags))
+            calls.append(("all", flags))
             return 0
 
         def mlock(self, address, size):
-            asked.append((address.value, size.value))
+            calls.append((address.value, size.value))
             return 0
 
     monkeypatch.setattr(clock_linux.ctypes, "CDLL", lambda _name: Library())
     monkeypatch.setattr(resource, "setrlimit", refuse)
     monkeypatch.setattr(resource, "getrlimit", lambda _kind: (8 << 20, 8 << 20))
     assert clock_linux.lock_memory([(4096, 100), (8192, 50)])
-    assert asked == [(4096, 100), (8192, 50)]
-    asked.clear()
+    assert calls == [(4096, 100), (8192, 50)]
+    calls.clear()
     monkeypatch.setattr(resource, "getrlimit", lambda _kind: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     assert clock_linux.lock_memory([(4096, 100)])
-    assert asked == [("all", 7)]
+    assert calls == [("all", 7)]
 
 
 class FakeLibrary:
-    """A library of Windows whose functions return what they are told."""
+    """A library of Windows whose functions return given values."""
 
     def __init__(self, **answers):
         for name, answer in answers.items():
@@ -195,7 +195,7 @@ COUNTER_HZ = 10_000_000
 
 
 class FakeWindows:
-    """A performance counter that a wait moves on by what the timer was set to, and every look by 1 us."""
+    """A performance counter: each wait advances it by the timer's setting, and each reading by 1 µs."""
 
     def __init__(self, ticks):
         self.ticks = ticks
@@ -230,7 +230,7 @@ class FakeWindows:
 
 @pytest.fixture(scope="module")
 def windows():
-    """One fake for all tests: compiled code keeps the address of what it calls."""
+    """Return one fake for all tests, since compiled code keeps the addresses of its functions."""
     fake = FakeWindows(ticks=0)
     return fake, c_function(NOW, clock_windows.now), c_function(SLEEP, clock_windows.sleep)
 
@@ -301,7 +301,7 @@ def test_a_machine_that_runs_is_not_suspended_meanwhile() -> None:
 
 @pytest.mark.parametrize("module", [clock_linux, clock_windows, macos], ids=["linux", "windows", "macos"])
 def test_each_system_has_the_parts_of_a_clock(module):
-    """Only one of them is loaded on this system, so no session here would notice."""
+    """Only one of them is loaded on this system, so sessions here would not reveal a missing part."""
     tree = ast.parse(inspect.getsource(clock))
     used = {
         node.attr

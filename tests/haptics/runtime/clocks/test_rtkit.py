@@ -16,7 +16,7 @@ from study_app.haptics.runtime.clocks.linux import make_high_priority, make_real
 
 
 class Service:
-    """A bus with the service on it: takes calls apart by the specification, and answers each as it is set up to."""
+    """A bus with the service: parses calls by the specification, and answers each as configured."""
 
     def __init__(self, path, *, refuses=(), auth=b"OK 1234deadbeef\r\n"):
         self.calls = []
@@ -71,10 +71,10 @@ class Service:
         stream.write(signal)
         body = b""
         if member == "Get":
-            asked = self.calls[-1][1].rstrip(b"\0").rsplit(b"\0", 1)[-1]
-            if b"MaxRealtimePriority" in asked:
+            property_name = self.calls[-1][1].rstrip(b"\0").rsplit(b"\0", 1)[-1]
+            if b"MaxRealtimePriority" in property_name:
                 body = b"\x01i\0\0" + struct.pack("<i", 15)
-            elif b"MinNiceLevel" in asked:
+            elif b"MinNiceLevel" in property_name:
                 body = b"\x01i\0\0" + struct.pack("<i", -7)
             else:
                 body = b"\x01x\0\0\0\0\0\0" + struct.pack("<q", 200_000)
@@ -85,26 +85,26 @@ class Service:
 
 @pytest.fixture
 def limits(monkeypatch):
-    """Keep this process' own limits; return what was asked for."""
-    asked = []
-    monkeypatch.setattr(resource, "setrlimit", lambda kind, limit: asked.append((kind, limit)))
-    return asked
+    """Keep the limits of this process; return the requested ones."""
+    requests = []
+    monkeypatch.setattr(resource, "setrlimit", lambda kind, limit: requests.append((kind, limit)))
+    return requests
 
 
 @pytest.fixture
 def serve(tmp_path):
-    made = []
+    services = []
 
     def begin(**how):
-        made.append(Service(tmp_path / "bus", **how))
-        return made[-1], str(tmp_path / "bus")
+        services.append(Service(tmp_path / "bus", **how))
+        return services[-1], str(tmp_path / "bus")
 
     yield begin
-    for service in made:
+    for service in services:
         service.end()
 
 
-def test_the_service_is_asked_for_what_it_grants_at_most(serve, limits):
+def test_the_highest_granted_priority_is_requested(serve, limits):
     service, path = serve()
     assert make_real_time(4711, path) == 15
     assert service.heard.startswith(b"\0AUTH EXTERNAL ")
