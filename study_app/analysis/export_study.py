@@ -68,9 +68,9 @@ def _files(study: Study, extras: Collection[Extra]) -> tuple[Mapping[str, bytes 
     files = table_files(study, tables, extras, cells)
     if "psych-ds" not in extras:
         return files, ()
-    from study_app.analysis.report.write_report import has_questions, report_files  # noqa: PLC0415 - only to share a study
+    from study_app.analysis.report.write_report import has_results, report_files  # noqa: PLC0415 - only to share a study
 
-    report, failures = report_files(study) if has_questions(study) else ({}, ())
+    report, failures = report_files(study) if has_results(study) else ({}, ())
     named = {file_name(study, table, "csv"): table for table in tables}
     contents = {name: files.get(name) or table_bytes(table) for name, table in named.items()}
     described = {name: table.columns for name, table in named.items()}

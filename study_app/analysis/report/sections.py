@@ -68,6 +68,8 @@ def no_findings_sentence(results: Results) -> str:
     """Return a sentence on the reason why there are no findings."""
     if results.blocks:
         return "No answers are included yet."
+    if not (results.questions or results.levels):
+        return "The study does not ask questions; the sections below show how participants moved."
     return "The study does not ask participants to rate statements after trials; the sections below show the answers."
 
 

@@ -273,9 +273,9 @@ def report(
     """
     progress("reading", 0.0)
     study = load_study(folder)
-    if not has_questions(study):
+    if not has_results(study):
         raise AnalysisError(
-            f"{folder}: the study {study.name!r} does not ask any questions, so there is nothing to report"
+            f"{folder}: the study {study.name!r} contains neither trials nor questions, so there is nothing to report"
         )
     files, report_failures = report_files(study, progress)
     progress("writing", 0.95)
@@ -287,9 +287,9 @@ def report(
     return written
 
 
-def has_questions(study: Study) -> bool:
-    """Return whether a study has answers to report."""
-    return bool(study.blocks or study.others.questions)
+def has_results(study: Study) -> bool:
+    """Return whether a study has trials or answers to report."""
+    return bool(study.trial_blocks or study.others.questions)
 
 
 def report_files(study: Study, progress: Progress = report_no_progress) -> tuple[dict[str, bytes], tuple[Failure, ...]]:

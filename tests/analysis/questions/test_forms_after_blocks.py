@@ -1,6 +1,7 @@
 """A study whose only outcomes are forms after its blocks: its design, motion, hypotheses and groups in the report."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -12,7 +13,7 @@ from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import cards, presented_in
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.motion_section import motion_section
-from study_app.analysis.report.write_report import motion_csv
+from study_app.analysis.report.write_report import motion_csv, report
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude
 from study_app.store.unblinding import unblind
@@ -116,6 +117,21 @@ def test_motion_and_delays_are_shown_for_blocks_without_statements(study: Study)
     assert "Late | Damper, 60 ms | 60 ms" in conduct
     assert "Block orders Six orders: " in conduct
     assert "each block occurred" in conduct
+
+
+def test_a_study_without_questions_has_a_report_of_its_trials(tmp_path: Path) -> None:
+    file = tmp_path / "reach.toml"
+    text = FILE.replace('sequence = ["about", "d0", "load", "d1", "load", "d2", "load"]', "")
+    head, tail = text.split("[questionnaires.about]")
+    blocks = tail[tail.index("[blocks.d0]") : tail.index("[analysis]")]
+    file.write_text(f"{head}{blocks}", encoding="utf-8", newline="\n")
+    folder = rehearse_answers(file, participants=3, seed=5, results=tmp_path / "results", features=made_up(file))
+    unblind(folder, "AB", "to analyse")
+    page = report(folder, tmp_path / "report", failed=pytest.fail)[0].read_text(encoding="utf-8")
+    assert "The study does not ask questions; the sections below show how participants moved." in page
+    assert "Were the delays presented as specified?" in page
+    assert "“Prompt”, “Late” and “Very late” each presented one condition twice" in page
+    assert len((tmp_path / "report" / "motion.csv").read_text(encoding="utf-8").splitlines()) > 3
 
 
 def test_hypotheses_name_blocks_by_their_titles(study: Study) -> None:
