@@ -499,7 +499,7 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
         "",
         "## Analysis",
         "",
-        *(f"- {line}" for line in analyses(protocol)),
+        *(f"- {line}" for line in [*analyses(protocol)] or [_WITHOUT_TESTS]),
         "",
         "## The protocol in words",
         "",
@@ -512,6 +512,11 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
         commitment_lines(committed),
     ]
     return "\n".join(lines)
+
+
+_WITHOUT_TESTS: Final = (
+    "No test is planned. We report the medians and quartiles of duration, path length and force in each condition."
+)
 
 
 def _without_hypothesis(protocol: Protocol) -> str:

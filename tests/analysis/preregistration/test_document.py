@@ -112,6 +112,21 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     assert "`liquid-study power rek2024 --to DIR`" in text
 
 
+def test_a_study_without_questions_plans_no_test() -> None:
+    study_text = """
+format = 2
+study.name = "reach"
+liquids.damper.drag = { law = "linear", damping_nspm = 8 }
+conditions = { prompt = { liquid = "damper" }, late = { liquid = "damper", delay_ms = 90 } }
+tasks.stir = { kind = "follow", instruction = "Go." }
+blocks.b = { conditions = ["prompt", "late"], order = "shuffled" }
+analysis.participants = 7
+"""
+    text = preregistration(parse(study_text.encode(), "reach.toml"), "0" * 64)
+    analysis = text.partition("## Analysis\n\n")[2].partition("\n\n## ")[0]
+    assert analysis.startswith("- No test is planned. We report the medians and quartiles of duration, path length")
+
+
 def test_the_tables_of_power_are_included(tmp_path: Path) -> None:
     (tmp_path / "power.md").write_text(
         "# Power for Feeling (rek2024 1.1)\n\n## Delays\n\n| n |\n", encoding="utf-8", newline="\n"
