@@ -753,12 +753,20 @@ def _reductions(results: Results) -> Iterator[str]:
         yield "the median of repeated answers to a statement"
     if any(result.largest is None and _has_repeated_answers(result.contrast, results) for result in of_questions):
         yield "the mean of repeated answers to another question"
+    if any(_is_averaged_over_conditions(result.contrast, results) for result in of_questions):
+        yield "the mean over the conditions of a block"
     compared = {(block, result.contrast.measure) for result in results.contrasts for block in result.contrast.blocks}
     for level in results.levels:
         for measure, (statistic, _) in _STATISTICS.items():
             standards = {getattr(row, "standard", None) for row in statistic.rows_in(level)}
             if (level.block, measure) in compared and len(standards) > 1:
                 yield f"the mean over the standards in {quoted_title(level.title)}"
+
+
+def _is_averaged_over_conditions(contrast: Contrast, results: Results) -> bool:
+    """Return whether blocks or groups are compared in a question that is asked in several conditions of a block."""
+    several = {block.id for block in results.trial_blocks if len(block.settings) > 1}
+    return contrast.form is None and contrast.conditions is None and not several.isdisjoint(contrast.blocks)
 
 
 def _has_repeated_answers(contrast: Contrast, results: Results) -> bool:

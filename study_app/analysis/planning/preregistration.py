@@ -180,7 +180,9 @@ def _reduction_text(protocol: Protocol, contrast: Contrast) -> str:
         is_averaged = any(block.stimulus is not None and len(protocol.standards_of(block)) > 1 for block in blocks)
         return " (the mean over the standards)" if is_averaged and contrast.measure != "exponent" else ""
     reduced = "median" if protocol.compares_statement(contrast) else "mean"
-    return f" (the {reduced} of repeated answers)"
+    has_several = any(len(protocol.blocks[name].conditions) > 1 for name in contrast.blocks)
+    is_averaged = has_several and contrast.form is None and contrast.conditions is None
+    return f" (the {reduced} of repeated answers{', averaged over the conditions of a block' if is_averaged else ''})"
 
 
 def _equivalence_sentences(protocol: Protocol, contrast: Contrast) -> str:

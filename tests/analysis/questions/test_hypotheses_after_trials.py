@@ -16,6 +16,7 @@ from study_app.analysis.planning.power_estimates import estimate_markdown, estim
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import ConditionFeatures
 from study_app.analysis.report.first_page import cards
+from study_app.analysis.report.methods import methods
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
 from study_app.protocol.model import Contrast
@@ -174,9 +175,18 @@ def test_the_preregistration_states_only_the_tested_hypotheses(study: Study) -> 
         "- We describe the answers to the questions in block “First” and block “Second”, but do not test them except "
         "in the hypotheses above." in text
     )
-    assert text.count("participant (the mean of repeated answers).") == 4
+    assert text.count("participant (the mean of repeated answers).") == 2
+    assert text.count("(the mean of repeated answers, averaged over the conditions of a block).") == 2
     assert "Friedman" not in text
     assert "agreement" not in text.partition("## The protocol in words")[0]
+
+
+def test_the_methods_state_the_mean_over_conditions_only_where_blocks_are_compared(study: Study) -> None:
+    results = evaluate(study)
+    one_value = "contributed one value to each comparison (the mean of repeated answers to another question"
+    assert f"{one_value} and the mean over the conditions of a block)" in methods(study, results)
+    within_a_block = replace(results, contrasts=(results.contrasts[0],))
+    assert f"{one_value})" in methods(study, within_a_block)
 
 
 def test_power_is_stated_in_standard_deviations_without_simulated_studies() -> None:
