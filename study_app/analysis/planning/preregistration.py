@@ -22,9 +22,8 @@ from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
 from study_app.analysis.wording import bound_text, counted, inclusion_text, listed, percent, significant
 from study_app.errors import AnalysisError
+from study_app.protocol import descriptions, load
 from study_app.protocol.blocks import Block, block_titles, display_language
-from study_app.protocol.descriptions import describe, limit_rows, number_range, shows_feedback, trials_text
-from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import SPENDINGS, Analysis, Contrast, Protocol
 from study_app.protocol.orders import block_orders_by_group, variants
 from study_app.protocol.participants import fewest_participants
@@ -463,8 +462,8 @@ def _equivalence_text(decided: Decided) -> str:
 
 def preregistration_of(source: str, power: str | None = None) -> str:
     """Return the preregistration of a protocol file, or of a study by name."""
-    content = source_bytes(source)
-    return preregistration(parse(content, source), protocol_hash(content), power)
+    content = load.source_bytes(source)
+    return preregistration(load.parse(content, source), load.protocol_hash(content), power)
 
 
 def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = None) -> str:
@@ -506,7 +505,7 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
         "## The protocol in words",
         "",
         "```text",
-        *(line for line in describe(protocol).splitlines() if not line.startswith(f"  {PRECISION}")),
+        *(line for line in descriptions.describe(protocol).splitlines() if not line.startswith(f"  {PRECISION}")),
         "```",
         "",
         "## Values that the report checks",
@@ -562,8 +561,9 @@ def _design_lines(protocol: Protocol) -> Iterator[str]:
     for block in protocol.blocks_in_order:
         if block.phase != "main":
             yield (
-                f"The {block.phase} block {_title(protocol, block.id)} has {trials_text(protocol, block)}, which are "
-                f"not analysed.{_criterion_and_feedback_sentences(protocol, block)}"
+                f"The {block.phase} block {_title(protocol, block.id)} has "
+                f"{descriptions.trials_text(protocol, block)}, which are not analysed."
+                f"{_criterion_and_feedback_sentences(protocol, block)}"
             )
 
 
@@ -571,7 +571,7 @@ def _criterion_and_feedback_sentences(protocol: Protocol, block: Block) -> str:
     """Return sentences on the criterion that ends a block early and on feedback, each after a space."""
     until = block.until
     ends = "" if until is None else f" The block ends {until.condition_text()}; {until.missed_text}."
-    return ends + " Feedback is given after every trial." * shows_feedback(protocol, block)
+    return ends + " Feedback is given after every trial." * descriptions.shows_feedback(protocol, block)
 
 
 def _trial_order_sentence(protocol: Protocol, block: Block) -> str:
@@ -609,7 +609,7 @@ def _participant_lines(protocol: Protocol, committed: Commitment, power: str | N
         decided = decisions(protocol)
         counts = [protocol.session_count(group) or 1 for group in protocol.groups or (None,)]
         one_session = max(counts) == 1
-        each = "" if one_session else f", with {number_range(counts)} sessions each"
+        each = "" if one_session else f", with {descriptions.number_range(counts)} sessions each"
         complete = "completed a valid session" if one_session else "completed all of their sessions with valid data"
         planned = f"We plan to include {number_text.counted(committed.participants, 'participant')}{each}. "
         sample_size = planned + (
@@ -668,7 +668,7 @@ def _exclusion_lines(protocol: Protocol) -> Iterator[str]:
                 f"catch trials of block {_title(protocol, block.id)} is excluded; the program applies this rule when "
                 "the data are unblinded."
             )
-    limits = "; ".join(f"{limit} ({value})" for value, limit in limit_rows(protocol))
+    limits = "; ".join(f"{limit} ({value})" for value, limit in descriptions.limit_rows(protocol))
     has_intervals = any(block.design is not None for block in protocol.main_blocks)
     if has_intervals:
         attempts = protocol.limits.attempts

@@ -25,15 +25,15 @@ from study_app.analysis.statistics.mean_tests import means_of, p_differs, resamp
 from study_app.analysis.statistics.outcome import FEW, SIDES, doubled_ranks, false_discovery, holm, p_of_draws
 from study_app.analysis.wording import listed
 from study_app.errors import AnalysisError
+from study_app.protocol import simulated
 from study_app.protocol.blocks import Block, display_language
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.participants import LAPSE_POINTS, SimulatedParticipants, compared_kinds
 from study_app.protocol.questions import POINTS, Question
-from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulate_ratings
 from study_app.protocol.source import text_in
 
 LOWEST, HIGHEST = 1, POINTS
-ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
+ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[simulated.TrialFeatures]]
 """Features of rehearsed trials by (block, condition)."""
 
 
@@ -45,7 +45,7 @@ class PlannedBlock(StatementBlock):
     empty if all do.
     """
 
-    features: tuple[tuple[TrialFeatures, ...], ...]
+    features: tuple[tuple[simulated.TrialFeatures, ...], ...]
     repetitions: int
     groups: tuple[str, ...]
 
@@ -88,7 +88,9 @@ class Plan:
     @property
     def unknown(self) -> tuple[str, ...]:
         """The items that the answer model does not cover, so that no effect on them is simulated."""
-        return tuple(dict.fromkeys(item.id for block in self.blocks for item in block.items if item.id not in OPINIONS))
+        return tuple(
+            dict.fromkeys(item.id for block in self.blocks for item in block.items if item.id not in simulated.OPINIONS)
+        )
 
 
 def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
@@ -252,11 +254,11 @@ def draw_opinions(plan: Plan, participants: int, seed: int, study: int) -> tuple
     people_by_block: list[list[tuple[Array, Array, Array]]] = [[] for _ in plan.blocks]
     bias = []
     for _ in range(participants):
-        person = rater(rng.random, _STANDARD)
+        person = simulated.rater(rng.random, _STANDARD)
         bias.append(person.leaning)
         for place, block in enumerate(plan.blocks):
             items = [item.id for item in block.items]
-            thought, noise = simulate_ratings(items, block.features, block.repetitions, person, rng)
+            thought, noise = simulated.simulate_ratings(items, block.features, block.repetitions, person, rng)
             people_by_block[place].append((thought, noise, rng.random(noise.shape)))
     return tuple(
         Opinions(thought=thought, noise=noise, lapse=lapse, bias=np.array(bias), slopes=slopes)
