@@ -100,7 +100,7 @@ def test_the_report_shows_every_wording_in_every_language_and_its_changes(rek: R
     content = json.loads(later.receipt.read_text(encoding="utf-8"))
     before = content["protocol"]["questionnaires"]
     new = json.loads(json.dumps(content["protocol"]).replace(OLD, NEW))
-    new["study"]["version"] = "1.1"
+    new["study"]["version"] = "1.2"
     facts = {"protocol_hash": "2", "started_at": "2026-01-06T10:00:00.000+01:00", "saved_by": "AK"}
     receipt.write(later.receipt, content | facts | {"protocol": new})
 
@@ -110,9 +110,9 @@ def test_the_report_shows_every_wording_in_every_language_and_its_changes(rek: R
     texts = [text for form in before.values() for item in form["items"] for text in item["text"].values()]
     assert len(texts) > 20
     assert [text for text in (*texts, NEW) if str(escape(text)) not in appendix] == []
-    assert "Changes in version 1.1 (first session: P002, 2026-01-06; saved by AK)" in appendix
+    assert "Changes in version 1.2 (first session: P002, 2026-01-06; saved by AK)" in appendix
     assert (
-        "The wording of liquid.like_honey changed in version 1.1 (first session: P002, 2026-01-06; saved by AK)."
+        "The wording of liquid.like_honey changed in version 1.2 (first session: P002, 2026-01-06; saved by AK)."
         in page
     )
     assert "Changes in version 1.1" not in page
