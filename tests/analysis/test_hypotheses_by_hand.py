@@ -326,6 +326,7 @@ def test_the_methods_name_the_tests_and_corrections_of_all_hypotheses() -> None:
         contrasts=rows,
         levels=levels,
         blocks=(SimpleNamespace(id="b", presentations=(1, 3)),),
+        trial_blocks=(),
         questions=(
             SimpleNamespace(where="b", groups=(SimpleNamespace(code="L1", numbers={"n": 9, "participants": 4}),)),
         ),
