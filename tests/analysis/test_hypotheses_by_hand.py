@@ -349,7 +349,8 @@ def test_the_methods_name_the_tests_and_corrections_of_all_hypotheses() -> None:
     ):
         assert sentence in text
     assert lines[-1].endswith("with an equivalence bound of 1: P3 (asleep)).")
-    (alone, *_) = contrasts.contrast_methods(SimpleNamespace(contrasts=(paired,), levels=(), blocks=(), questions=()))  # type: ignore[arg-type]
+    single: Any = SimpleNamespace(contrasts=(paired,), levels=(), blocks=(), trial_blocks=(), questions=())
+    (alone, *_) = contrasts.contrast_methods(single)
     assert alone.startswith("The hypothesis (")
     assert list(contrasts.contrast_methods(SimpleNamespace(contrasts=()))) == []  # type: ignore[arg-type]
 
