@@ -462,8 +462,15 @@ def _jnd(result: LevelsResult, estimate: ThresholdEstimate) -> float | None:
 def _session_sd_text(result: LevelsResult) -> str:
     """Return the standard deviation of a person's threshold between sessions."""
     if result.has_pse:
-        return f"{100 * SESSION_SD * math.log(10):.0f} % of the just-noticeable difference"
+        return f"{100 * SESSION_SD * math.log(10):.0f} % of the just-noticeable difference (assumed)"
     return f"a factor of {10**SESSION_SD:.2f}"
+
+
+def _change_prior_text(result: LevelsResult) -> str:
+    """Return the standard deviation of the prior of a change over the trials."""
+    if result.has_pse:
+        return f"{100 * math.log(CHANGE_PRIOR):.0f} % of the just-noticeable difference"
+    return f"a factor of {CHANGE_PRIOR:g}"
 
 
 def _is_biased_by_lapses(group: ThresholdEstimate) -> bool:
@@ -772,7 +779,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
-        if any(map(cls.rows_in, blocks)):
+        if blocks := [block for block in blocks if cls.rows_in(block)]:
             yield (
                 "Thresholds are posterior medians, computed on a grid, with equal-tailed 95 % intervals, based on all "
                 "analysed answers at the levels delivered to the hand. The deviance was compared with the deviances "
@@ -780,8 +787,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "residual (Wichmann & Hill 2001). The intervals allow for differences in a person’s threshold between "
                 f"sessions (one standard deviation is {listed([*dict.fromkeys(map(_session_sd_text, blocks))])}; from "
                 "data in Jäkel & Wichmann 2006), and for a change over the trials if it exceeded "
-                f"{BEYOND_CHANCE:g} standard errors. The posterior averages over linear changes (prior: a factor of "
-                f"{CHANGE_PRIOR:g}), so the threshold "
+                f"{BEYOND_CHANCE:g} standard errors. The posterior averages over linear changes (prior: "
+                f"{listed([*dict.fromkeys(map(_change_prior_text, blocks))])}), so the threshold "
                 f"refers to the middle of the trials. We assumed that {100 * ALIKE:.0f} % of the standard deviation of "
                 "log widths is due to differences between participants and that lapse rates vary around a common "
                 "mean, so each participant’s width and lapse rate depend on all participants’ answers; the posterior "

@@ -34,10 +34,9 @@ def question_differences(
     ``setting`` is the measure of settings in words, "" for answers and scores. For the other parameters see
     `smallest_differences`.
     """
-    values_noun = f"participants' {setting}s" if setting else "answers or scores"
-    if setting == "point of subjective equality":
-        values_noun = "participants' points of subjective equality"
-    values_noun = values_noun if contrast.within is None else "within-participant differences"
+    values_noun = "participants' mean settings" if setting else "answers or scores"
+    if contrast.within is not None:
+        values_noun = "within-participant differences"
     logarithms = ", or of their logarithms if levels are spaced logarithmically" * bool(setting)
     description = (
         f"{'Settings' if setting else 'Answers to this question'} are not simulated. Differences are expressed in "
